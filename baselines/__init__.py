@@ -1,0 +1,1 @@
+"""The paper's baselines and the floors, one file a method, written as an outside entrant would."""

@@ -1,0 +1,19 @@
+"""EXP: each setting's own expert, told to it. No method can know this; it is the ceiling, not an entrant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from dextron_bench.experts import ExpertAgent
+
+
+@dataclass(frozen=True)
+class Exp:
+    """Replays the expert that solved each setting (paper, fig. 4a, "EXP")."""
+
+    name: ClassVar[str] = "exp"
+
+    def agent(self, seed: int) -> ExpertAgent:
+        """The same for every seed: experts are deterministic."""
+        return ExpertAgent()

@@ -1,0 +1,7 @@
+"""`python -m dextron_bench`: the same as the command `dextron-bench`."""
+
+import sys
+
+from dextron_bench.cli import main
+
+sys.exit(main())

@@ -1,0 +1,115 @@
+"""The command line: which verbs there are, and how what goes wrong becomes a line and an exit code.
+
+A verb is a frozen dataclass: its fields are the flags, its docstring the help, its call the work. Modules of
+verbs import nothing heavy, so that help is quick.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Protocol, Union
+
+import tyro
+
+from dextron_bench.verbs import data, doctor, figures, leaderboard, mc, run, splits, view
+from dextron_bench.verbs import list as listing
+
+
+class Verb(Protocol):
+    """Does its work when called, and returns the exit code."""
+
+    def __call__(self) -> int: ...
+
+
+Group = tuple[str, dict[str, type[Verb]]]  # What a group of verbs is about, and its verbs.
+
+VERBS: dict[str, type[Verb] | Group] = {
+    "run": run.Run,
+    "leaderboard": leaderboard.Leaderboard,
+    "view": view.View,
+    "list": listing.List,
+    "data": (
+        "Reaches: import or fetch the recorded ones, and see what a source holds.",
+        {"import": data.Import, "fetch": data.Fetch, "info": data.Info},
+    ),
+    "mc": mc.MonteCarlo,
+    "splits": splits.Splits,
+    "figures": figures.Figures,
+    "doctor": doctor.Doctor,
+}
+
+DONE, DIFFERS, USAGE, EPISODES_FAILED, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130  # Exit codes.
+OWN = ("dextron_bench", "baselines")  # Exceptions defined here are messages to the user.
+DESCRIPTION = """Grasping with a prosthetic hand that a person moves: a benchmark.
+
+Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or input, 3 some episodes failed,
+130 interrupted. With --debug, or DEXTRON_DEBUG set, errors show where they came from."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one verb and returns its exit code; `arguments` default to the process's own."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words or bool(os.environ.get("DEXTRON_DEBUG"))
+    words = [word for word in words if word != "--debug"]
+    if words == ["--version"]:
+        return _print_version()
+    try:
+        code = _parse(words)()
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # Whoever read the results has seen enough, as `| head` does.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except (KeyboardInterrupt, Exception) as error:
+        if debug:
+            raise
+        code, message = explain(error)
+        print(f"dextron-bench: {message}", file=sys.stderr)
+        return code
+
+
+def explain(error: BaseException) -> tuple[int, str]:
+    """Exit code and one line for what ended a verb."""
+    text = " ".join(str(error.args[0] if isinstance(error, KeyError) and error.args else error).split())
+    if isinstance(error, KeyboardInterrupt):
+        return INTERRUPTED, "interrupted"
+    if type(error).__module__.split(".")[0] in OWN:
+        return USAGE, text
+    if isinstance(error, OSError):
+        reason = error.strerror or text
+        return USAGE, f"{reason}: {error.filename}" if error.filename else reason
+    if isinstance(error, ModuleNotFoundError):
+        return USAGE, f"{text}; `dextron-bench doctor` shows what is missing"
+    return BUG, f"unexpected {type(error).__name__}: {text}; --debug shows where, and a report would be welcome"
+
+
+def _parse(words: Sequence[str]) -> Verb:
+    return tyro.cli(_union(VERBS), prog="dextron-bench", description=DESCRIPTION, args=words)
+
+
+def _union(verbs: Mapping[str, type[Verb] | Group]) -> Any:
+    """The table of verbs as the type that tyro makes subcommands of."""
+    named: list[Any] = []
+    for name, verb in verbs.items():
+        if isinstance(verb, tuple):
+            about, inner = verb
+            named.append(Annotated[_union(inner), tyro.conf.subcommand(name, description=about)])
+        else:
+            named.append(Annotated[verb, tyro.conf.subcommand(name)])
+    return Union[tuple(named)]  # noqa: UP007 (built at run time)
+
+
+def _print_version() -> int:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        print(f"dextron-bench {version('dextron-bench')}")
+    except PackageNotFoundError:
+        print("dextron-bench, run from its source without being installed")
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,21 @@
+"""Recordings: one episode in one .rrd file, exact enough to be verified, drawn so that a person sees it.
+
+The only package that talks to Rerun.
+"""
+
+from dextron_bench.recording.archive import BrokenRecording, Recorded, UnwritableRecording, Value, read, write
+from dextron_bench.recording.probe import probe
+from dextron_bench.recording.viewer import ViewerError, screenshots, view
+
+__all__ = [
+    "BrokenRecording",
+    "Recorded",
+    "UnwritableRecording",
+    "Value",
+    "ViewerError",
+    "probe",
+    "read",
+    "screenshots",
+    "view",
+    "write",
+]

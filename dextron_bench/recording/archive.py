@@ -1,0 +1,183 @@
+"""Episodes to .rrd files and back, bit for bit, with a digest that tells damage.
+
+A digest over every value in the file is kept among its properties: Rerun itself does not notice a flipped byte.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from rerun.chunk import Chunk, RrdReader
+from rerun_bindings import flush_and_cleanup_orphaned_recordings
+
+from dextron_bench.recording import layout, scene
+from dextron_bench.recording.digest import digest, lines
+from dextron_bench.rollout import Episode
+from dextron_bench.world import model, reach
+from dextron_bench.world.setting import Setting
+
+APPLICATION = "dextron-bench"
+ARRAYS = ("states", "actions", "rewards")
+ENDS = ("terminated", "truncated", "failure")
+
+Value = str | int | float | bool
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """An episode as its file tells it, and the properties that were given with it."""
+
+    episode: Episode
+    properties: dict[str, Value]
+
+
+class BrokenRecording(ValueError):
+    """A file that is no whole recording of this project."""
+
+    def __init__(self, file: Path, what: str) -> None:
+        super().__init__(f"{file}: {what}")
+
+
+class UnwritableRecording(OSError):
+    """A recording that could not be written; nothing was."""
+
+    def __init__(self, file: Path, why: object) -> None:
+        super().__init__(f"cannot write recording {file}: {why}")
+
+
+def write(file: Path, episode: Episode, path: reach.Path, properties: Mapping[str, Value]) -> str:
+    """Writes an episode that followed `path` to `file`, whole or not at all; returns the file's SHA-256.
+
+    Raises UnwritableRecording, and ValueError where the arrays make no episode.
+    """
+    rr.set_strict_mode(True)
+    chunks = [*_chunks(episode, properties), *scene.chunks(episode.states, path)]
+    props, told = _props()
+    identity = digest([*told, *lines(chunks)])
+    chunks += [*props, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
+    temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        temporary.touch()
+        _save(temporary, chunks, identity)
+        sha256 = _seal(temporary)
+        os.replace(temporary, file)
+    except (OSError, RuntimeError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise UnwritableRecording(file, why) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink()
+    return sha256
+
+
+def read(file: Path, sha256: str | None = None) -> Recorded:
+    """The episode in `file`, its arrays bit for bit as they were written; raises BrokenRecording.
+
+    The file's SHA-256, if given, is checked before anything is decoded; without it `probe` comes first
+    where a file may be damaged, since Rerun's decoder can abort the process.
+    """
+    chunks = _load(file, sha256)
+    kept = [chunk for chunk in chunks if chunk.entity_path != "/__properties/digest"]
+    told = _properties(chunks, "digest").get("sha256")
+    if told is None:
+        raise BrokenRecording(file, f"is no recording of {APPLICATION}: it carries no digest of its content")
+    if told != digest(lines(kept)):
+        raise BrokenRecording(file, "its content does not match its digest; it was damaged or changed after writing")
+    facts: dict[str, Any] = _properties(kept, "episode")
+    setting = Setting(*(facts[name] for name in Setting.__slots__))
+    arrays = {name: _array(kept, name) for name in ARRAYS}
+    episode = Episode(setting, **arrays, **{name: facts[name] for name in ENDS})
+    return Recorded(episode, _properties(kept, "run"))
+
+
+@cache
+def _props() -> tuple[list[Chunk], list[str]]:
+    """What every recording has, and its lines of the digest."""
+    chunks = [*scene.props(), *layout.lines()]
+    return chunks, list(lines(chunks))
+
+
+def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk]:
+    """What is kept of the episode, and what is plotted and told of it."""
+    steps = len(episode.actions)
+    shapes = (steps + 1, model.STATE), (steps, 1), (steps,)
+    for name, shape, first in zip(ARRAYS, shapes, (0, 0, 1), strict=True):
+        values = getattr(episode, name)
+        if not steps or values.shape != shape or values.dtype != np.float64:
+            raise ValueError(f"{name} of {steps} steps must be float64 {shape}, not {values.dtype} {values.shape}")
+        when = scene.timelines(first, first + len(values) - 1)
+        yield Chunk.from_columns(f"/episode/{name}", when, rr.Scalars.columns(scalars=values))
+    facts = {**asdict(episode.setting), **{name: getattr(episode, name) for name in ENDS}}
+    facts |= {"steps": steps, "episode_return": episode.score, "outcome": layout.outcome(episode)}
+    yield Chunk.from_property("episode", rr.AnyValues(**_values(facts)))
+    if properties:
+        yield Chunk.from_property("run", rr.AnyValues(**_values(properties)))
+    yield layout.card(episode, properties)
+    yield from layout.signals(episode.states)
+
+
+def _values(properties: Mapping[str, Value]) -> dict[str, pa.Array]:
+    """Arrow values; left to itself, Rerun drops empty strings."""
+    return {name: pa.array([value]) for name, value in properties.items()}
+
+
+def _save(file: Path, chunks: Iterable[Chunk], identity: str) -> None:
+    """Writes chunks and blueprint; raises RuntimeError where Rerun cannot or, switched off, would not."""
+    recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
+    try:
+        if not rr.is_enabled(recording):
+            raise RuntimeError("Rerun is switched off by RERUN in the environment; unset it")
+        recording.save(file, default_blueprint=layout.blueprint())
+        recording.send_chunks(chunks)
+        recording.disconnect()
+    finally:
+        del recording
+        flush_and_cleanup_orphaned_recordings()
+
+
+def _seal(file: Path) -> str:
+    """Makes the file's bytes last; returns their SHA-256."""
+    with file.open("rb") as opened:
+        os.fsync(opened.fileno())
+        return hashlib.file_digest(opened, "sha256").hexdigest()
+
+
+def _load(file: Path, sha256: str | None) -> list[Chunk]:
+    """All chunks of a whole file; raises BrokenRecording."""
+    if not file.is_file():
+        raise BrokenRecording(file, "there is no such file")
+    if sha256 not in (None, hashlib.sha256(file.read_bytes()).hexdigest()):
+        raise BrokenRecording(file, "is not the file whose SHA-256 was kept; it was damaged or changed after writing")
+    try:
+        return RrdReader(file).store().stream().to_chunks()
+    except Exception as error:  # Rerun's readers raise whatever they meet.
+        reason = str(error).splitlines()[0]
+        raise BrokenRecording(file, f"is cut short, damaged, or no .rrd file ({reason})") from error
+
+
+def _properties(chunks: Iterable[Chunk], name: str) -> dict[str, Value]:
+    """The named group of properties."""
+    found: dict[str, Value] = {}
+    for chunk in chunks:
+        if chunk.entity_path == f"/__properties/{name}":
+            columns = chunk.to_record_batch().to_pydict()
+            found |= {key: values[0][0] for key, values in columns.items() if not key.startswith("rerun.")}
+    return found
+
+
+def _array(chunks: Iterable[Chunk], name: str) -> np.ndarray:
+    """An exact array of the episode, in the shape in which it was given."""
+    chunk = next(chunk for chunk in chunks if chunk.entity_path == f"/episode/{name}" and not chunk.is_static)
+    values = chunk.to_record_batch().column("Scalars:scalars").flatten().to_numpy()
+    return values.copy() if name == "rewards" else values.reshape(chunk.num_rows, -1).copy()

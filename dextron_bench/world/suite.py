@@ -1,0 +1,108 @@
+"""The task as a dm_control environment."""
+
+from __future__ import annotations
+
+import copy
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+from dm_control.mujoco import engine as dm_mujoco
+from dm_control.mujoco import wrapper
+from dm_control.rl import control
+from dm_env import specs
+
+from dextron_bench.world import model, task
+from dextron_bench.world.faces import Settings, checked
+from dextron_bench.world.reach import PALM_AHEAD, Path
+from dextron_bench.world.setting import Setting, Source
+
+
+def load(
+    reaches: str | Source = "synthetic",
+    settings: Sequence[Setting] | None = None,
+    seed: int | np.random.Generator | None = None,
+) -> control.Environment:
+    """An environment that plays `settings` over and over, or draws from a source of reaches.
+
+    Takes the source or its name. Raises UnknownSource, MissingData, ActionError.
+    """
+    grasp = Grasp(Settings(reaches, settings), np.random.default_rng(seed))
+    return control.Environment(Physics.load(), grasp, n_sub_steps=model.substeps(), legacy_step=False)
+
+
+class Physics(dm_mujoco.Physics):
+    """The simulated hand, bottle and table; its steps are bit-equal to the engine's."""
+
+    @classmethod
+    def load(cls) -> Physics:
+        """A simulation of its own copy of the model."""
+        return cls.from_model(wrapper.MjModel(copy.copy(model.load())))
+
+    def after_reset(self) -> None:
+        """Computes what follows from the state, and forgets the solver's result, from which a step would start."""
+        super().after_reset()
+        self.data.qacc_warmstart[:] = 0.0
+
+    def states(self) -> np.ndarray:
+        """A copy of the state, shape (1, 48)."""
+        return np.concatenate([self.data.qpos, self.data.qvel])[None]
+
+    def carry(self, path: Path, step: int) -> None:
+        """Puts the palm's carrier at a path's pose of that control step, or at its last."""
+        pose = min(step, len(path) - 1)
+        self.data.mocap_pos[0] = path.positions[pose]
+        self.data.mocap_quat[0] = path.quaternions[pose]
+
+
+class Grasp(control.Task):
+    """Close the hand in time to lift the bottle. `setting` is the one being played."""
+
+    setting: Setting
+
+    def __init__(self, settings: Settings, rng: np.random.Generator) -> None:
+        self._settings, self._rng = settings, rng
+        self._progress = task.Progress.empty(1)
+        self._outcome = (0.0, False, False)
+
+    def initialize_episode(self, physics: Physics) -> None:
+        """Deals a setting; half closes the hand and puts it at the start of the reach."""
+        self.setting = self._settings.deal(self._rng)
+        self._path = self._settings.source.path(self.setting)
+        physics.carry(self._path, 0)
+        qpos = model.half_closed().copy()
+        qpos[model.PALM_POSITION] = self._path.positions[0] + PALM_AHEAD
+        qpos[model.PALM_QUATERNION] = self._path.quaternions[0]
+        physics.data.qpos[:] = qpos
+        self._progress.begin(np.array([0]), physics.states(), np.array([len(self._path)]))
+
+    def before_step(self, action: np.ndarray, physics: Physics) -> None:
+        """Commands the fingers and moves the hand on; raises ActionError."""
+        physics.set_control(task.commands(checked(action, (1,))[None])[0])
+        physics.carry(self._path, int(self._progress.step[0]) + 1)
+
+    def after_step(self, physics: Physics) -> None:
+        """Works out the reward and whether the episode is over."""
+        reward, terminated, truncated = self._progress.advance(np.array([0]), physics.states())
+        self._outcome = (float(reward[0]), bool(terminated[0]), bool(truncated[0]))
+
+    def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The state (48,): joint positions (25), then velocities (23)."""
+        return OrderedDict(state=physics.states()[0])
+
+    def get_reward(self, physics: Physics) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """1 for a step of the countdown with the bottle lifted, else 0."""
+        return self._outcome[0]
+
+    def get_termination(self, physics: Physics) -> float | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Discount of the last step: 0 where the bottle fell, 1 where time was up; None while the episode lasts."""
+        _, terminated, truncated = self._outcome
+        return 0.0 if terminated else 1.0 if truncated else None
+
+    def action_spec(self, physics: Physics) -> specs.BoundedArray:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """One closing speed in [-1, 1]; positive closes."""
+        return specs.BoundedArray((1,), np.float64, -1.0, 1.0, name="action")
+
+    def observation_spec(self, physics: Physics) -> OrderedDict[str, specs.Array]:
+        """What `get_observation` returns."""
+        return OrderedDict(state=specs.Array((model.STATE,), np.float64, name="state"))

@@ -1,0 +1,64 @@
+"""A contract that every installed method keeps, and what EXP and the floors do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.exp import Exp
+from baselines.floors import Nothing, Random
+from dextron_bench import methods
+from dextron_bench.experts import Expert
+from dextron_bench.rollout import Privileged
+from dextron_bench.world import model
+
+QUICK = ("exp", "nothing", "random")  # Methods that need no training to give an agent.
+
+
+def states(n: int) -> np.ndarray:
+    """Made-up states (n, 48) of hands half closed, between 0.1 and 0.4 m from the bottle."""
+    rows = np.zeros((n, model.STATE))
+    rows[:, :25] = model.half_closed()
+    rows[:, 7] = np.linspace(-0.1, -0.4, n)
+    return rows
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_every_agent_keeps_the_contract(name: str):
+    agent = methods.create(name).agent(0)
+    shown = states(5)
+    before = shown.copy()
+    if isinstance(agent, Privileged):
+        agent.assign(np.arange(5), [Expert(1.2, 0.5)] * 5)
+    agent.reset(np.arange(5))
+    for _ in range(3):
+        actions = agent.act(shown)
+        assert actions.shape == (5, 1)
+        assert actions.dtype == np.float64
+        assert (np.abs(actions) <= 1.0).all()
+    np.testing.assert_array_equal(shown, before)
+
+
+def test_only_exp_is_told_the_experts():
+    assert isinstance(Exp().agent(0), Privileged)
+    assert not isinstance(Nothing().agent(0), Privileged)
+    assert not isinstance(Random().agent(0), Privileged)
+
+
+def test_exp_follows_each_rows_expert():
+    agent, row = Exp().agent(0), np.arange(2)
+    agent.assign(row, [Expert(1.0, 0.01), Expert(1.5, 0.9)])
+    agent.reset(row)
+    shown = states(2)
+    shown[1] = shown[0]
+    np.testing.assert_array_equal(agent.act(shown), [[0.0], [0.0]])
+    # Half closed, still at the first distance: both open, by K (0 - 0.5).
+    np.testing.assert_allclose(agent.act(shown), [[-0.5], [-0.75]])
+
+
+def test_a_floor_sends_nothing_and_the_other_uniform_noise():
+    assert not Nothing().agent(0).act(states(3)).any()
+    noise = Random().agent(0).act(states(4000))
+    assert abs(noise.mean()) < 0.04  # 4 sigma of the mean is 0.037.
+    assert noise.min() < -0.99
+    assert noise.max() > 0.99

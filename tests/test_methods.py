@@ -1,0 +1,143 @@
+"""Methods by name, module and file; and what is said where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.exp import Exp
+from baselines.floors import Nothing, Random
+from dextron_bench import methods
+from dextron_bench.methods import UnknownMethod
+from dextron_bench.rollout import AgentError
+
+AGENT = """
+from pathlib import Path
+with Path(__file__).with_suffix(".log").open("a") as log:
+    log.write("executed\\n")
+
+class Mine:
+    name = "mine"
+    def agent(self, seed): ...
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Callable[[str], Path]:
+    """Writes the text of a method's file and returns where."""
+
+    def write(text: str) -> Path:
+        (tmp_path / "mine.py").write_text(text)
+        return tmp_path / "mine.py"
+
+    return write
+
+
+def test_installed_methods_by_name():
+    assert {"exp", "nothing", "random"} <= set(methods.known())
+    assert methods.find("exp") is Exp
+    assert methods.describe("exp") == 'Replays the expert that solved each setting (paper, fig. 4a, "EXP").'
+
+
+@pytest.mark.parametrize("name", methods.known())
+def test_every_installed_method_can_be_made_and_has_plain_settings(name: str):
+    found = methods.create(name)
+    assert found.name == name
+    assert all(isinstance(value, (str, int, float, bool, tuple)) for value in methods.settings(found).values())
+    assert methods.describe(name).endswith(".")
+
+
+def test_by_module():
+    assert methods.find("baselines.floors:Nothing") is Nothing
+
+
+def test_by_file_which_is_executed_once(file: Callable[[str], Path]):
+    place = file(AGENT)
+    first, second = methods.find(f"{place}:Mine"), methods.find(f"{place}:Mine")
+    assert first is second
+    assert first.name == "mine"
+    assert place.with_suffix(".log").read_text() == "executed\n"
+
+
+def test_the_origin_of_a_file_changes_with_its_content(file: Callable[[str], Path]):
+    spec = f"{file(AGENT)}:Mine"
+    before = methods.origin(spec)
+    assert before["class"] == "mine.py:Mine"
+    file(AGENT + "# Another thought.\n")
+    assert methods.origin(spec)["sha256"] != before["sha256"]
+    assert (
+        methods.origin("exp") == methods.origin("baselines.exp:Exp") == {"class": "baselines.exp:Exp", "sha256": None}
+    )
+
+
+def test_an_unknown_name_lists_the_others():
+    with pytest.raises(
+        UnknownMethod, match=r"^no method 'xep'; choose from .*exp, .*nothing, .*random, or give module"
+    ):
+        methods.find("xep")
+
+
+@pytest.mark.parametrize(
+    ("spec", "complaint"),
+    [
+        ("nosuch.module:Agent", "ModuleNotFoundError: No module named 'nosuch'"),
+        ("baselines.exp:Nosuch", "'baselines.exp:Nosuch' is not a method"),
+        ("baselines.exp:dataclass", "is not a method"),
+        ("dextron_bench.experts:ExpertAgent", "needs to be a class with `name` and `agent"),
+        ("nosuch.py:Agent", "there is no file nosuch.py"),
+        (":Agent", "cannot be imported"),
+    ],
+)
+def test_what_is_no_method_is_named(spec: str, complaint: str):
+    with pytest.raises(UnknownMethod) as caught:
+        methods.find(spec)
+    assert complaint in str(caught.value)
+    assert spec in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("1 / 0\n", "cannot be imported: ZeroDivisionError: division by zero"),
+        ("def broken(:\n", "cannot be imported: SyntaxError: invalid syntax"),
+        ("import nosuchpackage\n", "cannot be imported: ModuleNotFoundError: No module named 'nosuchpackage'"),
+        ("raise SystemExit(0)\n", "cannot be imported: SystemExit: 0"),
+        ("class Other: ...\n", "is not a method"),
+        ("class Mine:\n    name = '../up'\n    def agent(self, seed): ...\n", "has the name '../up'"),
+        ("class Mine:\n    name = 3\n    def agent(self, seed): ...\n", "has the name 3"),
+    ],
+)
+def test_a_file_that_fails_says_how(file: Callable[[str], Path], text: str, complaint: str):
+    spec = f"{file(text)}:Mine"
+    for _ in range(2):  # A failed import leaves nothing that looks imported.
+        with pytest.raises(UnknownMethod) as caught:
+            methods.find(spec)
+        assert complaint in str(caught.value)
+
+
+def test_a_method_that_cannot_be_made_says_why(file: Callable[[str], Path]):
+    place = file("class Mine:\n    name = 'mine'\n    def __init__(self, size): ...\n    def agent(self, seed): ...\n")
+    with pytest.raises(AgentError, match=r"^making method .* raised TypeError: .*'size'"):
+        methods.create(f"{place}:Mine")
+
+
+def test_a_broken_installed_method_is_told_of_in_the_list(monkeypatch: pytest.MonkeyPatch):
+    broken = EntryPoints([EntryPoint("broken", "nosuch.module:Agent", methods.GROUP)])
+    monkeypatch.setattr(methods, "entry_points", lambda **params: broken.select(**params))
+    assert methods.known() == ("broken",)
+    assert methods.describe("broken").startswith("method 'broken' cannot be imported: ModuleNotFoundError")
+
+
+def test_settings_are_the_fields():
+    assert methods.settings(Random()) == {}
+
+
+def test_equal_seeds_act_equally_and_others_do_not():
+    states = np.zeros((4, 48))
+    first, again, other = (methods.create("random").agent(seed).act(states) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert (first != other).any()

@@ -1,0 +1,114 @@
+"""Splits keep apart what they promise to, and difficulty is what a scan finds."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dextron_bench import partition
+from dextron_bench.partition import Sizes, TooFewRows
+from dextron_bench.world import setting
+from dextron_bench.world.engine import Engine
+from dextron_bench.world.minjerk import MinjerkSource
+
+SIZES = Sizes(evaluated=20, val=10, open=5, subjects=2, reaches=0.25)
+
+
+class Strata(setting.ReachSource):
+    """Stands in for a source: 32 reaches of 8 subjects, none of which is ever played."""
+
+    def __init__(self) -> None:
+        super().__init__("made-up", [])
+        self.names = tuple(f"{subject}-{reach}" for subject in "abcdefgh" for reach in range(4))
+
+    def stratum(self, reach: str) -> setting.Stratum:
+        return setting.Stratum(reach[0], 0, 0)
+
+
+@pytest.fixture(scope="module")
+def database() -> pd.DataFrame:
+    rng = np.random.default_rng(0)
+    settings = pd.DataFrame(
+        {
+            "reach": rng.choice(Strata().names, 400),
+            "offset_x": rng.uniform(-0.06, 0.06, 400),
+            "offset_y": rng.uniform(-0.06, 0.06, 400),
+            "duration_noise": rng.standard_normal(400),
+        }
+    )
+    rows = settings.loc[np.repeat(np.arange(400), 3)].reset_index(drop=True)
+    rows["gain"], rows["critical"] = 1.2, np.tile([0.2, 0.4, 0.6], 400)
+    rows["score"] = np.tile([20.0, 20.0, 12.0], 400)
+    return rows
+
+
+@pytest.fixture(scope="module")
+def parts(database) -> dict[str, pd.DataFrame]:
+    return partition.partition(Strata(), database, 0, SIZES, by_subject=True)
+
+
+def subjects(rows: pd.DataFrame) -> set[str]:
+    return set(rows["reach"].str[0])
+
+
+def test_sizes_and_only_solved_rows(parts):
+    assert {name: len(rows) for name, rows in parts.items() if name != "train"} == {
+        "val": 10, "test": 20, "unseen-reach": 20, "unseen-subject": 20,
+    }  # fmt: skip
+    assert all((rows["score"] == 20).all() for rows in parts.values())
+
+
+def test_nothing_leaks(parts):
+    home = pd.concat([parts["train"], parts["val"], parts["test"], parts["unseen-reach"]])
+    assert len(subjects(parts["unseen-subject"])) == 2
+    assert not subjects(parts["unseen-subject"]) & subjects(home)
+    seen = pd.concat([parts["train"], parts["val"], parts["test"]])
+    assert not set(parts["unseen-reach"]["reach"]) & set(seen["reach"])
+    settings = [set(rows[partition.SETTING].itertuples(index=False, name=None)) for rows in parts.values()]
+    assert sum(len(each) for each in settings) == len(set.union(*settings))
+
+
+def test_train_keeps_every_expert_of_its_settings_and_the_others_one(parts):
+    assert (parts["train"].groupby(partition.SETTING).size() == 2).all()
+    assert (parts["test"].groupby(partition.SETTING).size() == 1).all()
+
+
+def test_equal_seeds_give_equal_parts(database, parts):
+    again = partition.partition(Strata(), database, 0, SIZES, by_subject=True)
+    for name, rows in parts.items():
+        pd.testing.assert_frame_equal(rows, again[name])
+
+
+def test_a_database_too_small_says_so(database):
+    with pytest.raises(TooFewRows, match="needs 20 solved settings"):
+        partition.partition(Strata(), database.head(60), 0, SIZES, by_subject=False)
+
+
+def test_near_equal_settings_are_dropped():
+    held = pd.DataFrame([["a", 0.01, 0.02, 0.5]], columns=partition.SETTING)
+    rows = pd.DataFrame(
+        [
+            ["a", 0.0105, 0.0205, 0.51],  # Near in all three.
+            ["a", 0.0115, 0.02, 0.5],  # 1.5 mm apart.
+            ["a", 0.01, 0.02, 0.53],  # Another duration.
+            ["b", 0.01, 0.02, 0.5],  # Another reach.
+        ],
+        columns=partition.SETTING,
+    )
+    assert partition.without_near(rows, held).index.tolist() == [1, 2, 3]
+
+
+def test_window_and_best_of_a_scan():
+    scores = np.array([[0, 20, 20, 20, 0, 20, 0, 0], [0, 0, 3, 0, 0, 0, 0, 0], np.zeros(8)], float)
+    np.testing.assert_allclose(partition.window(scores), [0.89 * 4 / 8, 0.0, 0.0])
+    # The middles of bands 2 and 2; with nothing anywhere, of the whole range (band 3).
+    np.testing.assert_allclose(partition.best(scores), 0.01 + 0.89 * np.array([2.5, 2.5, 3.5]) / 8)
+
+
+def test_a_scan_plays_each_row_with_its_own_gain():
+    source = MinjerkSource()
+    rows = setting.to_frame([source.sample(np.random.default_rng(0))] * 2).assign(gain=[2.0, 1.0])
+    scores = partition.scan(source, rows, Engine(6, 1), points=3)
+    swapped = partition.scan(source, rows.iloc[::-1], Engine(6, 1), points=3)
+    np.testing.assert_array_equal(scores, swapped[::-1])
+    assert scores[0, 0] > 1  # Closes at d_c = 0.158, as the paper's expert of this world.
+    assert scores[0, 2] == 0  # Closes at 0.752, long before it comes to the bottle.

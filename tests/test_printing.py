@@ -1,0 +1,61 @@
+"""Progress on stderr: what a bar shows, and when there is none."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import pytest
+
+from dextron_bench.verbs import printing
+
+
+class Terminal:
+    """Stands in for a terminal on stderr."""
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        self.text += text
+        return len(text)
+
+    def flush(self) -> None: ...
+
+
+def test_a_bar_shows_count_rate_and_time_left(monkeypatch: pytest.MonkeyPatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    with printing.progress_bar("rows") as progress:
+        progress(100, 400)  # What an earlier run did says nothing of the rate.
+        for done in (110, 120, 130):
+            time.sleep(0.1)
+            progress(done, 400)
+    last = terminal.text.split("\r")[-1]
+    assert "130/400" in last
+    rate = float(last.split("/s")[0].split()[-1])
+    assert 20 < rate < 130  # 10 each 0.1 s or a little more.
+    assert "left" in last
+
+
+def test_a_bar_is_silent_off_a_terminal_and_when_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+    with printing.progress_bar("rows") as progress:
+        progress(1, 2)
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with printing.progress_bar("rows", quiet=True) as progress:
+        progress(1, 2)
+    assert terminal.text == ""
+    monkeypatch.undo()
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(("speed", "text"), [(None, ""), (0.0123, "0.012/s"), (4.56, "4.6/s"), (1234.5, "1234/s")])
+def test_rates_are_short(speed: float | None, text: str):
+    assert printing._rate(speed) == text

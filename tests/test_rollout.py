@@ -1,0 +1,115 @@
+"""The evaluation loop: every case once, whatever the slots, and faults that stay in their own episode."""
+
+import numpy as np
+import pytest
+
+from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench.rollout import AgentError, Case, Episode, fault, rollout
+from dextron_bench.world.minjerk import MinjerkSource
+from dextron_bench.world.setting import Setting
+
+SOURCE = MinjerkSource()
+CASES = [Case(Setting(SOURCE.names[i], 0.0, 0.0, 0.0), Expert(2.0, d_c), 0.0) for i, d_c in enumerate([0.15, 0.9, 0.1])]
+
+
+class Sends:
+    """Sends one value, or what a function of the call's number gives, to every episode."""
+
+    def __init__(self, value):
+        self.value, self.calls, self.resets = value, -1, []
+
+    def reset(self, episodes):
+        self.resets.append(episodes.tolist())
+
+    def act(self, states) -> np.ndarray:
+        self.calls += 1
+        value = self.value(self.calls) if callable(self.value) else self.value
+        return np.full((len(states), 1), value)
+
+
+def play(agent, cases=CASES, **options) -> dict[int, Episode]:
+    return dict(rollout(agent, SOURCE, cases, threads=1, **options))
+
+
+def test_every_case_is_played_once_and_equally_for_any_number_of_slots():
+    one, all_at_once = play(ExpertAgent(), slots=1), play(ExpertAgent(), slots=3)
+    assert sorted(one) == sorted(all_at_once) == [0, 1, 2]
+    for index, episode in one.items():
+        other = all_at_once[index]
+        assert episode.setting == CASES[index].setting
+        np.testing.assert_array_equal(episode.states, other.states)
+        np.testing.assert_array_equal(episode.actions, other.actions)
+        np.testing.assert_array_equal(episode.rewards, other.rewards)
+
+
+def test_shapes_of_an_episode_and_how_it_ends():
+    episode = play(Sends(0.0))[0]
+    steps = len(episode.rewards)
+    assert episode.states.shape == (steps + 1, 48)
+    assert episode.actions.shape == (steps, 1)
+    assert episode.terminated != episode.truncated
+    assert episode.failure == ""
+
+
+def test_the_agent_is_told_which_rows_begin():
+    agent = Sends(0.0)
+    play(agent, slots=2)
+    assert agent.resets[0] == [0, 1]
+    assert len(agent.resets) == 2
+    assert agent.resets[1] in ([0], [1])
+
+
+@pytest.mark.parametrize(
+    ("value", "reason"),
+    [(np.nan, "action is nan at step 0"), (np.inf, "action is inf at step 0"), (1.5, "action 1.5 is outside [-1, 1]")],
+)
+def test_a_faulty_action_fails_the_episode_by_name(value, reason):
+    episodes = play(Sends(value))
+    assert all(episode.failure.startswith(reason) for episode in episodes.values())
+    assert [episode.score for episode in episodes.values()] == [0.0, 0.0, 0.0]
+
+
+def test_a_fault_leaves_the_other_episodes_alone():
+    class OneBreaks(ExpertAgent):
+        def act(self, states):
+            actions = super().act(states)
+            actions[1] = np.nan
+            return actions
+
+    broken, sound = play(OneBreaks()), play(ExpertAgent())
+    assert broken[1].failure
+    for index in (0, 2):
+        np.testing.assert_array_equal(broken[index].states, sound[index].states)
+
+
+def test_a_fault_in_a_later_step_says_when():
+    episode = play(Sends(lambda call: 0.0 if call < 3 else -2.0), CASES[:1])[0]
+    assert episode.failure == "action -2 is outside [-1, 1] at step 3"
+    assert len(episode.actions) == 3
+
+
+def test_actions_of_the_wrong_shape_end_the_evaluation():
+    class Flat(Sends):
+        def act(self, states):
+            return np.zeros(len(states))
+
+    with pytest.raises(AgentError, match=r"must return floats of shape \(3, 1\).*it returned float64 of shape \(3,\)"):
+        play(Flat(0.0))
+
+
+def test_the_agent_cannot_change_the_states_it_is_shown():
+    class Meddles(Sends):
+        def act(self, states):
+            states[:] = 7.0
+            return super().act(states)
+
+    np.testing.assert_array_equal(play(Meddles(0.0))[0].states, play(Sends(0.0))[0].states)
+
+
+def test_no_cases_give_no_episodes():
+    assert play(Sends(0.0), []) == {}
+
+
+def test_what_a_fault_is_called():
+    assert fault(-1.01) == "action -1.01 is outside [-1, 1]"
+    assert fault(-np.inf) == "action is -inf"
