@@ -13,7 +13,7 @@ from typing import Annotated, Any, Protocol, Union
 
 import tyro
 
-from dextron_bench.verbs import data, doctor, figures, leaderboard, mc, run, splits, view
+from dextron_bench.verbs import data, data_model, doctor, figures, leaderboard, mc, run, splits, view
 from dextron_bench.verbs import list as listing
 
 
@@ -31,8 +31,11 @@ VERBS: dict[str, type[Verb] | Group] = {
     "view": view.View,
     "list": listing.List,
     "data": (
-        "Reaches: import or fetch the recorded ones, and see what a source holds.",
-        {"import": data.Import, "fetch": data.Fetch, "info": data.Info},
+        "Reaches: import or fetch the recorded ones, see what a source holds, fit and judge the synthetic ones.",
+        {
+            **{"import": data.Import, "fetch": data.Fetch, "info": data.Info},
+            **{"fit": data_model.Fit, "likeness": data_model.Likeness},
+        },
     ),
     "mc": mc.MonteCarlo,
     "splits": splits.Splits,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench import montecarlo, provenance
+from dextron_bench import blocks, montecarlo, provenance
 from dextron_bench.world import setting, task
 
 BANDS = 9  # Equal bands of d_c in the statistics.
@@ -26,7 +26,7 @@ def save(
     draws: pd.DataFrame, source: setting.Source, search: montecarlo.Search, folder: Path, name: str
 ) -> tuple[Path, dict[str, Any]]:
     """Writes the kept rows as `<name>.parquet` and a summary as `<name>.json`; returns the file and the summary."""
-    kept = draws[draws["score"] > montecarlo.KEPT].reset_index(drop=True)
+    kept = draws[draws["score"] > blocks.KEPT].reset_index(drop=True).astype({"length": int})
     file = folder / f"{name}.parquet"
     provenance.write_whole(file, lambda part: kept.to_parquet(part, compression="zstd"))
     about = {
@@ -36,7 +36,6 @@ def save(
         "settings": len(draws) // search.experts,
         "kept": len(kept),
         "solved": int((kept["score"] == task.SUCCESS).sum()),
-        "mean_length": float(draws["length"].mean()),
         "statistics": statistics(draws, source).to_dict("records"),
         "provenance": provenance.collect(),
     }
@@ -70,10 +69,13 @@ def summary(file: Path) -> dict[str, Any]:
     return found
 
 
-def shipped(reaches: str) -> pd.DataFrame:
-    """The database that ships for a source of reaches."""
+def shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """The database that ships for a source of reaches, and its summary; raises FileNotFoundError where none does."""
     with as_file(files("dextron_bench") / "data") as folder:
-        return load(folder / f"experts-{reaches}.parquet")
+        file = folder / f"experts-{reaches}.parquet"
+        if not file.exists():
+            raise FileNotFoundError(f"no expert database ships for {reaches!r}; make one with `mc`")
+        return load(file), summary(file)
 
 
 def digest(rows: pd.DataFrame) -> str:
@@ -99,7 +101,7 @@ def statistics(draws: pd.DataFrame, source: setting.Source) -> pd.DataFrame:
         "d_c": _bands(draws["critical"], np.linspace(0.0, 0.9, BANDS + 1)),
         "duration": _bands(pd.Series([source.duration(s) for s in setting.from_frame(draws)]), np.arange(11.0)),
     }
-    outcome = pd.DataFrame({"kept": draws["score"] > montecarlo.KEPT, "solved": draws["score"] == task.SUCCESS})
+    outcome = pd.DataFrame({"kept": draws["score"] > blocks.KEPT, "solved": draws["score"] == task.SUCCESS})
     parts = []
     for by, key in keys.items():
         counted = outcome.groupby(key, sort=True).agg(["size", "sum"])

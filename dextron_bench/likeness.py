@@ -7,15 +7,16 @@ Oquab, 2017). Every reach is judged by a classifier that has not seen it. Needs 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from dextron_bench.likeness_features import features
+from dextron_bench.likeness_features import GROUPS, alone, features, nearest, strata, summaries
 from dextron_bench.world.reach import Reach
-from dextron_bench.world.synthetic import ANGLES, REGIONS, generate
+from dextron_bench.world.synthetic import ANGLES, COUNT, REGIONS, generate, shipped
 from dextron_bench.world.synthetic_fit import fit
 
 FOLDS = 5
@@ -27,6 +28,8 @@ RIDGE = 0.01  # Inverse strength of the penalty on standardised coefficients.
 REPEATS = 400  # Of the bootstrap.
 LEVELS = (0.025, 0.975)
 
+Tick = Callable[[], None]  # Called after each model that was fitted, and each classifier.
+
 
 class MissingClassifiers(ImportError):
     """scikit-learn is not installed."""
@@ -35,7 +38,35 @@ class MissingClassifiers(ImportError):
         super().__init__("the test of likeness needs scikit-learn: install dextron-bench[dev]")
 
 
-def report(real: Sequence[Reach], synthetic: Sequence[Reach], seed: int) -> pd.DataFrame:
+def silent() -> None:
+    """A Tick that tells nobody."""
+
+
+def study(
+    real: Sequence[Reach], seed: int, progress: Callable[[int, int], None] = lambda done, total: None
+) -> dict[str, pd.DataFrame]:
+    """Tables of how alike synthetic and recorded reaches are: `held out` is a `report`, the others have its names.
+
+    `nearest` looks at the shipped reaches, all others at models that have not seen the reaches they are judged by.
+    Raises MissingClassifiers before anything is computed.
+    """
+    judgements = (len(GROUPS) + 1) * len(classifiers(seed))
+    total, done = FOLDS + judgements + PEOPLE_FOLDS * (1 + 2 * judgements), itertools.count(1)
+
+    def tick() -> None:
+        progress(next(done), total)
+
+    synthetic, model = held_out(real, seed, tick), shipped()
+    return {
+        "held out": report(real, synthetic, seed, tick),
+        "alone": alone(real, synthetic),
+        "nearest": nearest(real, [generate(number, model) for number in range(COUNT)]),
+        "distributions": summaries(real, synthetic),
+        "strangers": strangers(real, seed, tick),
+    }
+
+
+def report(real: Sequence[Reach], synthetic: Sequence[Reach], seed: int, tick: Tick = silent) -> pd.DataFrame:
     """AUCs with 95 % intervals: a row for each group of features, classifier and stratum of start regions.
 
     Columns group, classifier, stratum, auc, low, high, real and synthetic (numbers of reaches). Strata are `all`,
@@ -56,6 +87,7 @@ def report(real: Sequence[Reach], synthetic: Sequence[Reach], seed: int) -> pd.D
                 interval = auc_interval(scores[member & ~made], scores[member & made], rng)
                 counts = {"real": int((member & ~made).sum()), "synthetic": int((member & made).sum())}
                 rows.append({"group": group, "classifier": classifier, "stratum": stratum, **interval, **counts})
+            tick()
     return pd.DataFrame(rows)
 
 
@@ -106,17 +138,6 @@ def folds(labels: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarra
     return fold
 
 
-def strata(reaches: Sequence[Reach]) -> Iterator[tuple[str, np.ndarray]]:
-    """Names of strata, and which reaches (n,) are in them; only those that have any."""
-    ring, angle = np.array([r.ring for r in reaches]), np.array([r.angle for r in reaches])
-    yield "all", np.ones(len(reaches), bool)
-    for name, places in (("ring", ring), ("angle", angle)):
-        for place in np.unique(places):
-            yield f"{name} {place}", places == place
-    for region in np.unique(ANGLES * ring + angle):
-        yield f"{region // ANGLES}-{region % ANGLES}", ANGLES * ring + angle == region
-
-
 def auc_interval(low: np.ndarray, high: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
     """AUC of scores of recorded (m,) and synthetic (n,) reaches, with a 95 % bootstrap interval; NaN without any."""
     if not (len(low) and len(high)):
@@ -127,7 +148,7 @@ def auc_interval(low: np.ndarray, high: np.ndarray, rng: np.random.Generator) ->
     return {"auc": float(wins.mean()), "low": float(bounds[0]), "high": float(bounds[1])}
 
 
-def held_out(reaches: Sequence[Reach], seed: int) -> list[Reach]:
+def held_out(reaches: Sequence[Reach], seed: int, tick: Tick = silent) -> list[Reach]:
     """Synthetic reaches to set beside recorded ones, each from a model that was not fitted to its counterpart.
 
     The recorded reaches are spread over FOLDS; for each one in a fold, COPIES are made of the same start region
@@ -142,7 +163,23 @@ def held_out(reaches: Sequence[Reach], seed: int) -> list[Reach]:
         for reach in (r for r, f in zip(reaches, fold, strict=True) if f == k):
             cell = ANGLES * reach.ring + reach.angle + REGIONS * sessions.index(session(reach))
             out += [generate(cell + REGIONS * len(sessions) * copy, model) for copy in range(COPIES)]
+        tick()
     return out
+
+
+def strangers(reaches: Sequence[Reach], seed: int, tick: Tick = silent) -> pd.DataFrame:
+    """AUCs for subjects whom the model has not seen, mean, least and greatest of PEOPLE_FOLDS splits.
+
+    Columns group, classifier, beside, auc, low, high. Recorded reaches of some subjects are told from those that are
+    `beside` them: `synthetic` ones of a model of the other subjects, or the recorded ones of these `people`.
+    """
+    parts = []
+    for away, made, others in held_out_subjects(reaches, seed):
+        tick()
+        for beside, rows in (("synthetic", made), ("people", others)):
+            parts.append(report(away, rows, seed, tick).query("stratum == 'all'").assign(beside=beside))
+    grouped = pd.concat(parts).groupby(["group", "classifier", "beside"], sort=False)["auc"]
+    return grouped.agg(auc="mean", low="min", high="max").reset_index()
 
 
 def held_out_subjects(reaches: Sequence[Reach], seed: int) -> Iterator[tuple[list[Reach], list[Reach], list[Reach]]]:

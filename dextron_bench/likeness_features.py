@@ -5,13 +5,16 @@ Reaches are read as the simulator reads them, through the smooth curve that inte
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.distance import cdist
+from scipy.stats import rankdata
 
 from dextron_bench.world import rotation
 from dextron_bench.world.reach import Reach
+from dextron_bench.world.synthetic import ANGLES
 
 GROUPS = ("durations", "paths", "orientations", "smooth speeds", "raw speeds")
 BEFORE, AFTER = 14, 7  # Poses looked at before and after the hand arrives.
@@ -32,6 +35,17 @@ def features(reaches: Sequence[Reach]) -> dict[str, np.ndarray]:
         for r in reaches
     ]
     return {group: np.array([row[i] for row in rows]) for i, group in enumerate(GROUPS)}
+
+
+def strata(reaches: Sequence[Reach]) -> Iterator[tuple[str, np.ndarray]]:
+    """Names of strata, and which reaches (n,) are in them; only those that have any."""
+    ring, angle = np.array([r.ring for r in reaches]), np.array([r.angle for r in reaches])
+    yield "all", np.ones(len(reaches), bool)
+    for name, places in (("ring", ring), ("angle", angle)):
+        for place in np.unique(places):
+            yield f"{name} {place}", places == place
+    for region in np.unique(ANGLES * ring + angle):
+        yield f"{region // ANGLES}-{region % ANGLES}", ANGLES * ring + angle == region
 
 
 def durations(reach: Reach) -> np.ndarray:
@@ -116,3 +130,27 @@ def summaries(real: Sequence[Reach], synthetic: Sequence[Reach]) -> pd.DataFrame
             for name in table.columns
         ]
     return pd.DataFrame(rows).sort_values(["measure", "source"], kind="stable", ignore_index=True)
+
+
+def nearest(real: Sequence[Reach], synthetic: Sequence[Reach]) -> pd.DataFrame:
+    """Least distance [m] and its QUANTILES, one row a source, from each reach to the nearest (other) recorded one.
+
+    The distance of two reaches is the root mean square over their `path`.
+    """
+    recorded, made = (np.array([path(reach) for reach in reaches]) for reaches in (real, synthetic))
+    between = cdist(recorded, recorded)
+    np.fill_diagonal(between, np.inf)
+    rows = []
+    for source, distances in (("real", between), ("synthetic", cdist(made, recorded))):
+        least = pd.Series(distances.min(axis=1) / np.sqrt(BEFORE + AFTER))
+        rows.append({"source": source, "least": least.min(), **least.quantile(list(QUANTILES)).to_dict()})
+    return pd.DataFrame(rows)
+
+
+def alone(real: Sequence[Reach], synthetic: Sequence[Reach]) -> pd.DataFrame:
+    """Lowest and highest AUC of a single feature taken as the score, one row for each of GROUPS."""
+    rows = []
+    for group, values in features([*real, *synthetic]).items():
+        wins = rankdata(values, axis=0)[len(real) :].mean(axis=0) - (len(synthetic) + 1) / 2
+        rows.append({"group": group, "low": wins.min() / len(real), "high": wins.max() / len(real)})
+    return pd.DataFrame(rows)

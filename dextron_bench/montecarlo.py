@@ -7,7 +7,6 @@ killed and taken up again, on any number of threads, and finds the same rows.
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,25 +14,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dextron_bench import experts, opening, provenance
-from dextron_bench.world import model, setting, task
+from dextron_bench import blocks, experts, opening
+from dextron_bench.world import setting
 from dextron_bench.world.engine import Engine
-
-KEPT = 1.0  # Rows with a sum of rewards above this are kept (paper, II.C).
 
 SLOTS = 1024  # Episodes at once, among them those kept free for experts still to close.
 
 
 class BadSearch(ValueError):
     """A search that cannot be."""
-
-
-class SearchMismatch(ValueError):
-    """A folder that holds another search than the one asked for."""
-
-
-class DamagedBlock(ValueError):
-    """A block of a search that cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -52,16 +41,6 @@ class Search:
     def __post_init__(self) -> None:
         if min(self.experts, self.block) < 1 or self.seed < 0:
             raise BadSearch("a search needs at least one expert and one setting per block, and a seed of 0 or more")
-
-
-@dataclass(frozen=True, slots=True)
-class Tally:
-    """How far a search is: blocks in store, draws tried, rows kept, rows with all 20 rewards."""
-
-    blocks: int
-    draws: int
-    kept: int
-    solved: int
 
 
 def draw(source: setting.Source, search: Search, block: int) -> pd.DataFrame:
@@ -110,7 +89,7 @@ def run(
     folder: Path,
     rows: int,
     engine: Engine,
-    report: Callable[[Tally], None] = lambda tally: None,
+    report: Callable[[blocks.Tally], None] = lambda tally: None,
     share: Share | None = None,
 ) -> pd.DataFrame:
     """Searches on until `rows` rows have all 20 rewards; returns every draw with its outcome, in order.
@@ -119,36 +98,41 @@ def run(
     different shares may work in one folder. Raises SearchMismatch where it holds another search, and
     DamagedBlock.
     """
-    _claim(search, folder)
-    done = _refresh(folder, {})
-    report(total(done))
-    if last_needed(done, rows) is None:
+    blocks.claim(asdict(search), folder)
+    done = blocks.refresh(folder, {})
+    report(blocks.total(done))
+    if blocks.last_needed(done, rows) is None:
         for number, draws in _play(source, search, engine, done, share or Share()):
-            provenance.write_whole(_file(folder, number), lambda part, d=draws: d.to_parquet(part, compression="zstd"))
-            done = _refresh(folder, done)
-            report(total(done))
-            if last_needed(done, rows) is not None:
+            blocks.write(folder, number, draws)
+            done = blocks.refresh(folder, done)
+            report(blocks.total(done))
+            if blocks.last_needed(done, rows) is not None:
                 break
-    last = last_needed(done, rows)
+    last = blocks.last_needed(done, rows)
     assert last is not None
-    return pd.concat([_read(_file(folder, number)) for number in range(last + 1)], ignore_index=True)
+    return pd.concat([blocks.read(blocks.file_of(folder, number)) for number in range(last + 1)], ignore_index=True)
 
 
-def total(done: dict[int, Tally]) -> Tally:
-    """The sum over blocks."""
-    parts = done.values()
-    return Tally(len(done), sum(t.draws for t in parts), sum(t.kept for t in parts), sum(t.solved for t in parts))
+def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataFrame, count: int) -> None:
+    """Puts in store the first `count` blocks, of which a database holds the `kept` rows, to search on from there.
 
-
-def last_needed(done: dict[int, Tally], rows: int) -> int | None:
-    """The block with which blocks 0, 1, ... reach so many solved rows; None while they do not."""
-    solved = number = 0
-    while number in done:
-        solved += done[number].solved
-        if solved >= rows:
-            return number
-        number += 1
-    return None
+    Only what a database knows comes back: draws it did not keep get a score of 0 and no length. Blocks
+    already in store stay. Raises SearchMismatch where rows are not of this search.
+    """
+    blocks.claim(asdict(search), folder)
+    key = ["reach", "gain", "critical"]
+    found = 0
+    for number in range(count):
+        draws = draw(source, search, number).assign(score=0.0, length=np.nan)
+        ahead = kept.iloc[found : found + len(draws)]
+        place = pd.MultiIndex.from_frame(draws[key]).get_indexer(pd.MultiIndex.from_frame(ahead[key]))
+        place = place[np.logical_and.accumulate(place >= 0)]
+        draws.loc[place, ["score", "length"]] = ahead[["score", "length"]].head(len(place)).to_numpy(float)
+        found += len(place)
+        if not blocks.file_of(folder, number).exists():
+            blocks.write(folder, number, draws)
+    if found < len(kept):
+        raise blocks.SearchMismatch(f"row {found} of the database is not of a search with seed {search.seed}")
 
 
 def _play(
@@ -184,36 +168,3 @@ class _Block:
     scores: np.ndarray
     lengths: np.ndarray
     left: int
-
-
-def _tally(draws: pd.DataFrame) -> Tally:
-    score = draws["score"]
-    return Tally(1, len(score), int((score > KEPT).sum()), int((score == task.SUCCESS).sum()))
-
-
-def _claim(search: Search, folder: Path) -> None:
-    """Makes the folder this search's, or checks that it is."""
-    wanted = {"search": asdict(search), "physics": model.mjcf_hash()}
-    file = folder / "search.json"
-    if not file.exists():
-        provenance.write_json(file, wanted)
-    found = json.loads(file.read_text(encoding="utf-8"))
-    if found != wanted:
-        raise SearchMismatch(f"{folder} holds another search ({found}); choose another folder, or remove it")
-
-
-def _file(folder: Path, number: int) -> Path:
-    return folder / "blocks" / f"{number:06d}.parquet"
-
-
-def _refresh(folder: Path, done: dict[int, Tally]) -> dict[int, Tally]:
-    """The tallies of all blocks in store; only those not yet in `done` are read."""
-    stored = sorted(int(file.stem) for file in (folder / "blocks").glob("[0-9]*.parquet"))
-    return {number: done.get(number) or _tally(_read(_file(folder, number))) for number in stored}
-
-
-def _read(file: Path) -> pd.DataFrame:
-    try:
-        return pd.read_parquet(file)
-    except (OSError, ValueError) as error:
-        raise DamagedBlock(f"{file} is damaged ({error}); remove it and search again") from error

@@ -46,7 +46,7 @@ def partition(
     Held-out subjects and reaches are drawn at random. Evaluated splits have one row a setting; `train`
     keeps every expert of its settings, less settings near-equal to an evaluated one.
     """
-    rng = np.random.default_rng([seed, 1])
+    rng = np.random.default_rng([seed, 0, 1])  # Three words, where the blocks of a search have two.
     solved = database[database["score"] == task.SUCCESS].sample(frac=1.0, random_state=rng)
     subject = {name: source.stratum(name).subject for name in source.names}
     subjects = sorted(set(subject.values()))
@@ -83,7 +83,7 @@ def without_near(rows: pd.DataFrame, held: pd.DataFrame) -> pd.DataFrame:
 
 def draw_open(source: setting.Source, parts: Iterable[pd.DataFrame], seed: int, sizes: Sizes) -> pd.DataFrame:
     """Uniform settings and gains, solvable or not, near-equal to none of the other parts, with no d_c yet."""
-    rng = np.random.default_rng([seed, 0, 2])  # Three words, where the blocks of a search have two.
+    rng = np.random.default_rng([seed, 0, 2])
     count = 2 * sizes.open
     rows = setting.to_frame([source.sample(rng) for _ in range(count)]).assign(gain=rng.uniform(*experts.GAIN, count))
     return without_near(rows, pd.concat(parts)).head(sizes.open)

@@ -12,8 +12,9 @@ import pandas as pd
 import pytest
 from brief import SOURCE
 
-from dextron_bench import experts, montecarlo, rollout
-from dextron_bench.montecarlo import Search, Share, Tally
+from dextron_bench import blocks, experts, montecarlo, rollout
+from dextron_bench.blocks import Tally
+from dextron_bench.montecarlo import Search, Share
 from dextron_bench.world import setting
 from dextron_bench.world.engine import Engine
 
@@ -67,13 +68,26 @@ def test_outcomes_are_those_of_a_naive_search(tmp_path):
 
 def test_a_search_stops_with_the_first_blocks_that_reach_the_rows():
     done = {0: Tally(1, 8, 3, 2), 1: Tally(1, 8, 0, 0), 2: Tally(1, 8, 5, 4), 4: Tally(1, 8, 9, 9)}
-    assert [montecarlo.last_needed(done, rows) for rows in (1, 2, 3, 6, 7)] == [0, 0, 2, 2, None]
-    assert montecarlo.total(done) == Tally(4, 32, 17, 15)
+    assert [blocks.last_needed(done, rows) for rows in (1, 2, 3, 6, 7)] == [0, 0, 2, 2, None]
+    assert blocks.total(done) == Tally(4, 32, 17, 15)
+
+
+def test_a_search_goes_on_from_what_a_database_kept(tmp_path):
+    def kept(draws: pd.DataFrame) -> pd.DataFrame:
+        return draws[draws["score"] > blocks.KEPT].astype({"length": int}).reset_index(drop=True)
+
+    first = search(tmp_path / "first", rows=1)
+    count = len(first) // (SMALL.block * SMALL.experts)
+    montecarlo.restore(SOURCE, SMALL, tmp_path / "second", kept(first), count)
+    whole = search(tmp_path / "first", rows=3)
+    pd.testing.assert_frame_equal(kept(search(tmp_path / "second", rows=3)), kept(whole))
+    with pytest.raises(blocks.SearchMismatch, match="row 0 of the database"):
+        montecarlo.restore(SOURCE, Search("brief", 4, 3, 4), tmp_path / "other", kept(first), count)
 
 
 def test_a_folder_holds_one_search(tmp_path):
     search(tmp_path, rows=1)
-    with pytest.raises(montecarlo.SearchMismatch, match="holds another search"):
+    with pytest.raises(blocks.SearchMismatch, match="holds another search"):
         montecarlo.run(SOURCE, Search("brief", seed=4, experts=3, block=4), tmp_path, 1, Engine(12, 1))
 
 
@@ -81,7 +95,7 @@ def test_a_damaged_block_is_named(tmp_path):
     search(tmp_path, rows=1)
     block = sorted((tmp_path / "blocks").iterdir())[0]
     block.write_bytes(block.read_bytes()[:100])
-    with pytest.raises(montecarlo.DamagedBlock, match=f"{block.name} is damaged"):
+    with pytest.raises(blocks.DamagedBlock, match=f"{block.name} is damaged"):
         search(tmp_path, rows=1)
 
 

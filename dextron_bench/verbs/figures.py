@@ -27,7 +27,7 @@ class Figures:
 
         source = open_source(self.reaches)
         self.into.mkdir(parents=True, exist_ok=True)
-        solved = database.shipped(self.reaches).query("score == 20").head(self.rows)
+        solved = database.shipped(self.reaches)[0].query("score == 20").head(self.rows)
         starts, paths = (self.into / f"fig3{part}-{self.reaches}.png" for part in "ab")
         figures.start_points(source, solved, starts)
         figures.reach_paths(source, paths)

@@ -28,6 +28,8 @@ class MonteCarlo:
     """The part of the search that this process does, as 0/2 and 1/2 of two: several may work in one folder."""
     threads: int = 0
     """Threads of the simulation; 0 takes one for each processor."""
+    extend: bool = False
+    """Go on from the shipped database of this source of reaches, not from nothing."""
     runs: Path = Path("runs")
     """Folder of all runs; the search lives below it."""
     quiet: bool = False
@@ -44,6 +46,9 @@ class MonteCarlo:
         folder = self.runs / "mc" / self.reaches / f"seed{self.seed}"
         source = open_source(self.reaches)
         engine = Engine(montecarlo.SLOTS, self.threads)
+        if self.extend:
+            known, about = database.shipped(self.reaches)
+            montecarlo.restore(source, search, folder, known, about["settings"] // search.block)
         with progress_bar("rows of return 20", self.quiet) as progress:
             draws = montecarlo.run(
                 source, search, folder, self.rows, engine,

@@ -13,7 +13,7 @@ from measure import Row, alone, in_turns, note, scaled
 from pytest_benchmark.fixture import BenchmarkFixture
 from workload import reaches
 
-from dextron_bench import montecarlo, opening
+from dextron_bench import blocks, montecarlo, opening
 from dextron_bench.montecarlo import Search
 from dextron_bench.world import archive
 from dextron_bench.world.engine import Engine
@@ -62,7 +62,7 @@ def test_search_with_shared_openings(benchmark: BenchmarkFixture):
 
     seconds, one_by_one = in_turns(benchmark, shared, naive, ROUNDS)
     assert all((found == kept[0]).all() for found in kept)
-    rows = int((kept[0] > montecarlo.KEPT).sum())
+    rows = int((kept[0] > blocks.KEPT).sum())
     rate = rows / (seconds * THREADS)
     against = "one episode a draw, the same draws"
     note(

@@ -1,0 +1,90 @@
+"""The folder of a search: its blocks in store, one file each, and what they add up to."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from dextron_bench import provenance
+from dextron_bench.world import model, task
+
+KEPT = 1.0  # Rows with a sum of rewards above this are kept (paper, II.C).
+
+
+class SearchMismatch(ValueError):
+    """A folder that holds another search than the one asked for."""
+
+
+class DamagedBlock(ValueError):
+    """A block of a search that cannot be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """How far a search is: blocks in store, draws tried, rows kept, rows with all 20 rewards."""
+
+    blocks: int
+    draws: int
+    kept: int
+    solved: int
+
+
+def claim(search: dict[str, Any], folder: Path) -> None:
+    """Makes the folder this search's, or checks that it is."""
+    wanted = {"search": search, "physics": model.mjcf_hash()}
+    file = folder / "search.json"
+    if not file.exists():
+        provenance.write_json(file, wanted)
+    found = json.loads(file.read_text(encoding="utf-8"))
+    if found != wanted:
+        raise SearchMismatch(f"{folder} holds another search ({found}); choose another folder, or remove it")
+
+
+def write(folder: Path, number: int, draws: pd.DataFrame) -> None:
+    """Puts a block in store, whole."""
+    provenance.write_whole(file_of(folder, number), lambda part: draws.to_parquet(part, compression="zstd"))
+
+
+def file_of(folder: Path, number: int) -> Path:
+    """Where a block is stored."""
+    return folder / "blocks" / f"{number:06d}.parquet"
+
+
+def refresh(folder: Path, done: dict[int, Tally]) -> dict[int, Tally]:
+    """The tallies of all blocks in store; only those not yet in `done` are read."""
+    stored = sorted(int(file.stem) for file in (folder / "blocks").glob("[0-9]*.parquet"))
+    return {number: done.get(number) or _tally(read(file_of(folder, number))) for number in stored}
+
+
+def read(file: Path) -> pd.DataFrame:
+    """A block's draws with their outcomes; raises DamagedBlock."""
+    try:
+        return pd.read_parquet(file)
+    except (OSError, ValueError) as error:
+        raise DamagedBlock(f"{file} is damaged ({error}); remove it and search again") from error
+
+
+def total(done: dict[int, Tally]) -> Tally:
+    """The sum over blocks."""
+    parts = done.values()
+    return Tally(len(done), sum(t.draws for t in parts), sum(t.kept for t in parts), sum(t.solved for t in parts))
+
+
+def last_needed(done: dict[int, Tally], rows: int) -> int | None:
+    """The block with which blocks 0, 1, ... reach so many solved rows; None while they do not."""
+    solved = number = 0
+    while number in done:
+        solved += done[number].solved
+        if solved >= rows:
+            return number
+        number += 1
+    return None
+
+
+def _tally(draws: pd.DataFrame) -> Tally:
+    score = draws["score"]
+    return Tally(1, len(score), int((score > KEPT).sum()), int((score == task.SUCCESS).sum()))

@@ -1,0 +1,133 @@
+"""`dextron-bench data fit` and `data likeness`: the model behind synthetic reaches, and how like they are."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from dextron_bench.verbs.printing import print_json, print_table, progress_bar
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class BadSeed(ValueError):
+    """A seed below zero."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(f"a seed is 0 or more, not {seed}")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fit the model of synthetic reaches to the recorded ones again, and say how far it is from the shipped one.
+
+    Example: dextron-bench data fit --into synthetic-reaches.npz
+    """
+
+    seed: int = 0
+    """Seed of the fit; the shipped model has 0."""
+    into: Annotated[Path, tyro.conf.arg(metavar="FILE.npz")] = Path("synthetic-reaches.npz")
+    """File to write the parameters to."""
+    quiet: bool = False
+    """Show no progress."""
+
+    def __call__(self) -> int:
+        from importlib.resources import files
+
+        from dextron_bench import provenance
+        from dextron_bench.world import archive, synthetic_fit
+
+        if self.seed < 0:
+            raise BadSeed(self.seed)
+        shipped = files("dextron_bench").joinpath("data/synthetic-reaches.npz").read_bytes()
+        with progress_bar("models fitted", self.quiet) as progress, TemporaryDirectory() as folder:
+            model = synthetic_fit.fit(archive.load_reaches(), self.seed)
+            progress(1, 1)
+            made = Path(folder) / "model.npz"
+            synthetic_fit.save(model, made)
+            content = made.read_bytes()
+        into = self.into.expanduser()
+        provenance.write_whole(into, lambda part: part.write_bytes(content))
+        print(f"{into}: {len(content):,} bytes, {compared(content, shipped)}")
+        return 0
+
+
+def compared(made: bytes, shipped: bytes) -> str:
+    """What a file of parameters has in common with the shipped one, in words."""
+    import numpy as np
+
+    if made == shipped:
+        return "byte for byte the shipped file"
+    with np.load(io.BytesIO(made)) as new, np.load(io.BytesIO(shipped)) as old:
+        pairs = {name: (new[name].astype(float), old[name].astype(float)) for name in old.files}
+    if other := [name for name, (a, b) in pairs.items() if a.shape != b.shape]:
+        return f"not the shipped file: {', '.join(other)} differ in shape"
+    total = sum(a.size for a, _ in pairs.values())
+    differ = sum(int((a != b).sum()) for a, b in pairs.values())
+    if not differ:
+        return "every number as in the shipped file, but packed into other bytes"
+    far = {name: float(abs(a - b).max() / abs(b).max()) for name, (a, b) in pairs.items()}
+    worst = max(far, key=far.__getitem__)
+    return (
+        f"not the shipped file: {differ:,} of {total:,} numbers differ, by at most {far[worst]:.1g} of the largest "
+        f"in their array ({worst})"
+    )
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """Ask classifiers to tell synthetic reaches from recorded ones: AUC, where 0.5 is guessing. Takes minutes.
+
+    Example: dextron-bench data likeness --json
+    """
+
+    seed: int = 0
+    """Seed of folds, fits, forests and intervals."""
+    json: bool = False
+    """Print JSON: lists of rows by table, with every start region of every classifier."""
+    quiet: bool = False
+    """Show no progress."""
+
+    def __call__(self) -> int:
+        from dextron_bench import likeness
+        from dextron_bench.world import archive
+
+        if self.seed < 0:
+            raise BadSeed(self.seed)
+        with progress_bar("models and classifiers", self.quiet) as progress:
+            tables = likeness.study(archive.load_reaches(), self.seed, progress)
+        if self.json:
+            print_json({name: table.to_dict("records") for name, table in tables.items()})
+        else:
+            print_likeness(tables)
+        return 0
+
+
+def print_likeness(tables: dict[str, pd.DataFrame]) -> None:
+    """The tables of `likeness.study` on stdout."""
+    held_out, strangers = with_interval(tables["held out"]), with_interval(tables["strangers"])
+    forest = held_out[held_out["classifier"] == "forest"]
+    print_pivot("AUC [95 %], models without the reaches judged", held_out[held_out["stratum"] == "all"], "classifier")
+    print_pivot("AUC [95 %] of the forest by ring, angle and start region", forest, "group", rows="stratum")
+    for classifier, rows in strangers.groupby("classifier", sort=False):
+        print_pivot(f"AUC [least, most of three] for strangers, {classifier}", rows, "beside")
+    for name in ("alone", "nearest", "distributions"):
+        print_table(name, [str(column) for column in tables[name]], tables[name].itertuples(index=False))
+
+
+def with_interval(table: pd.DataFrame) -> pd.DataFrame:
+    """A table of AUCs with a column `cell` of text: the AUC and its bounds."""
+    cells = [f"{row.auc:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in table.itertuples()]
+    return table.assign(cell=cells)
+
+
+def print_pivot(title: str, table: pd.DataFrame, columns: str, rows: str = "group") -> None:
+    """Cells of a table on stdout, one row and one column for each of their values in two columns."""
+    wide = table.set_index([rows, columns])["cell"].unstack(sort=False)
+    print_table(title, [rows, *wide.columns], wide.reset_index().to_numpy().tolist())
