@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from mujoco.batch import Batch
@@ -88,3 +88,18 @@ class Engine:
         for rows in (self._batch.state, self._positions, self._quaternions):
             rows[target] = rows[source]
         self._progress.copy(source, target)
+
+    def save(self, ids: np.ndarray) -> dict[str, np.ndarray]:
+        """Copies of all that the episodes in slots `ids` (n,) go on from, but their paths."""
+        return {name: rows[ids].copy() for name, rows in self._rows().items()}
+
+    def load(self, ids: np.ndarray, saved: dict[str, np.ndarray]) -> None:
+        """Puts slots `ids` (n,), begun on the same paths, where those were that `save` was told of."""
+        for name, rows in self._rows().items():
+            rows[ids] = saved[name]
+
+    def _rows(self) -> dict[str, np.ndarray]:
+        return {
+            "state": self._batch.state,
+            **{field.name: getattr(self._progress, field.name) for field in fields(self._progress)},
+        }

@@ -1,0 +1,118 @@
+"""BC: the policy's network fitted to what experts did, with no world to try it in (paper, II.D)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import torch
+from dextron_bench.learning import Arrays, Track, Trainer
+from torch import Tensor
+
+from baselines import demonstrations, policy, snapshot
+from baselines.networks import Stack
+from baselines.normalise import CLIP, EPSILON
+from baselines.policy import MeanAgent
+from baselines.schedule import SCHEDULES, Preset, suffix
+
+BATCH = 512  # Table II.
+LEARNING_RATE = 1e-3
+HALVED_EVERY = 100  # Epochs.
+STEPS = 100  # Updates in an epoch; the paper does not say.
+
+
+def imitation_loss(mean: Tensor, actions: Tensor) -> Tensor:
+    """Mean squared error of each agent's own actions, the tanh of the mean; (S,) from (S, B, 1)."""
+    return (mean.tanh() - actions).square().mean(dim=(1, 2))
+
+
+@dataclass(frozen=True)
+class Bc:
+    """Behaviour cloning of the experts (paper, fig. 4a, "BC")."""
+
+    name: ClassVar[str] = "bc"
+    home: ClassVar[str] = ""
+
+    preset: Preset = "paper"
+    """How long to train: an hour (paper), minutes (quick), seconds (smoke)."""
+
+    @property
+    def label(self) -> str:
+        """The method's name, and its preset where that is not the paper's."""
+        return self.name + suffix(self.preset)
+
+    @property
+    def period(self) -> int:
+        """Epochs between checkpoints."""
+        return SCHEDULES[self.preset].period
+
+    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+        """One network a seed, side by side."""
+        schedule = SCHEDULES[self.preset]
+        return Cloning(demonstrations.of(track, schedule.episodes), seeds, schedule.epochs, track.device)
+
+    def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
+        """Plays the network's output."""
+        return MeanAgent(weights)
+
+
+class Cloning:
+    """The regression of S networks on demonstrations; a `learning.Trainer`.
+
+    A network has the policy's shape, so its second output is there and unused.
+    """
+
+    def __init__(
+        self, demos: demonstrations.Demonstrations, seeds: Sequence[int], epochs: int, device: str = "cpu"
+    ) -> None:
+        self.epochs, self.epoch = epochs, 0
+        self._seeds, self._device = list(seeds), device
+        rows = demos.transitions()
+        self._mean = demos.states[rows].mean(axis=0, dtype=np.float64)
+        self._deviation = np.sqrt(demos.states[rows].var(axis=0, dtype=np.float64) + EPSILON)
+        scaled = np.clip((demos.states[rows] - self._mean) / self._deviation, -CLIP, CLIP)
+        self._states = torch.tensor(scaled, dtype=torch.float32, device=device)
+        self._actions = torch.tensor(demos.actions[rows, None], dtype=torch.float32, device=device)
+        self._network = Stack.make(policy.STATE, 2, [np.random.default_rng([seed, 0]) for seed in seeds], device)
+        self._optimiser = torch.optim.Adam(self._network.parameters, lr=LEARNING_RATE, fused=True)
+
+    def advance(self) -> list[dict[str, float]]:
+        """One epoch of STEPS updates; notes the mean loss."""
+        for group in self._optimiser.param_groups:
+            group["lr"] = LEARNING_RATE * 0.5 ** (self.epoch // HALVED_EVERY)
+        size = (STEPS, BATCH)
+        draws = [np.random.default_rng([s, 1, self.epoch]).integers(len(self._states), size=size) for s in self._seeds]
+        rows = torch.tensor(np.stack(draws, axis=1), device=self._device)
+        losses = torch.stack([self._update(rows[t]) for t in range(STEPS)]).mean(dim=0)
+        self.epoch += 1
+        return [{"imitation_loss": loss} for loss in losses.double().tolist()]
+
+    def _update(self, rows: Tensor) -> Tensor:
+        """One gradient step of every network on demonstrations `rows` (S, BATCH); returns losses (S,)."""
+        mean, _ = policy.head(self._network(self._states[rows]))
+        losses = imitation_loss(mean, self._actions[rows])
+        self._optimiser.zero_grad(set_to_none=True)
+        losses.sum().backward()
+        self._optimiser.step()
+        return losses.detach()
+
+    def weights(self) -> list[Arrays]:
+        """Of each seed: the network's layers, and `mean` and `deviation` of states."""
+        layers = [parameter.detach().cpu().numpy() for parameter in self._network.parameters]
+        scale = {"mean": self._mean, "deviation": self._deviation}
+        return [{f"policy.{i}": a[k].copy() for i, a in enumerate(layers)} | scale for k in range(len(self._seeds))]
+
+    def state(self) -> Arrays:
+        """Networks and optimiser."""
+        return snapshot.save(self._network.parameters, self._optimiser) | {"epoch": np.array([self.epoch])}
+
+    def journal(self) -> Arrays:
+        """Nothing: the demonstrations are the same at any time."""
+        return {}
+
+    def restore(self, state: Arrays, journals: Iterable[Arrays]) -> None:
+        """Takes the place of the trainer that gave the state."""
+        snapshot.load(self._network.parameters, self._optimiser, state)
+        self.epoch = int(state["epoch"][0])

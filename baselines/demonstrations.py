@@ -1,0 +1,75 @@
+"""Expert episodes, played once, kept in a cache, and streamed in an order that each seed draws for itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dextron_bench import provenance
+from dextron_bench.experts import ExpertAgent
+from dextron_bench.learning import Track
+from dextron_bench.rollout import Case, rollout
+from dextron_bench.world import model
+from safetensors.numpy import load_file, save_file
+
+FORMAT = 1  # Of the cached file.
+
+
+@dataclass(frozen=True, slots=True)
+class Demonstrations:
+    """Episodes of experts, one after the other: states (R, 48), actions (R,), rewards (R,), float32.
+
+    Episode k has the rows from `starts[k]` to `starts[k + 1]`, of which the last is its last state alone. No expert
+    lets the bottle fall, so no demonstration terminates.
+    """
+
+    states: np.ndarray
+    actions: np.ndarray
+    rewards: np.ndarray
+    starts: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    def transitions(self) -> np.ndarray:
+        """The rows (n,) that begin a transition, in order."""
+        return np.delete(np.arange(len(self.states)), self.starts[1:] - 1)
+
+    def stream(self, rng: np.random.Generator, length: int) -> np.ndarray:
+        """Rows (length,) that begin a transition, as whole episodes drawn with replacement bring them."""
+        steps = np.diff(self.starts) - 1
+        drawn = rng.integers(len(self), size=length // int(steps.min()) + 1)
+        ends = steps[drawn].cumsum()
+        drawn = drawn[: np.searchsorted(ends, length) + 1]
+        begins = np.repeat(self.starts[drawn] - np.append(0, steps[drawn].cumsum()[:-1]), steps[drawn])
+        return (begins + np.arange(len(begins)))[:length].astype(np.int32)
+
+
+def of(track: Track, episodes: int | None = None) -> Demonstrations:
+    """The experts' episodes in the first so many cases of a track (all by default), played or from the cache."""
+    cases = track.cases[:episodes]
+    file = track.cache / f"demonstrations-{_digest(cases)[:16]}.safetensors"
+    if not file.exists():
+        made = play(track, cases)
+        provenance.write_whole(file, lambda part: save_file(made, part))
+    found = load_file(file)
+    return Demonstrations(**found)
+
+
+def play(track: Track, cases: Sequence[Case]) -> dict[str, np.ndarray]:
+    """The arrays of `Demonstrations` from the experts' own rollouts of cases."""
+    played = dict(rollout(ExpertAgent(), track.source, cases, threads=track.threads))
+    episodes = [played[k] for k in range(len(cases))]
+    lengths = [len(episode.states) for episode in episodes]
+    return {
+        "states": np.concatenate([episode.states for episode in episodes]).astype(np.float32),
+        "actions": np.concatenate([np.append(episode.actions[:, 0], 0.0) for episode in episodes]).astype(np.float32),
+        "rewards": np.concatenate([np.append(episode.rewards, 0.0) for episode in episodes]).astype(np.float32),
+        "starts": np.concatenate([[0], np.cumsum(lengths)]),
+    }
+
+
+def _digest(cases: Sequence[Case]) -> str:
+    """SHA-256 of what the episodes depend on."""
+    return provenance.digest(f"{FORMAT} {model.mjcf_hash()}".encode(), *(repr(case).encode() for case in cases))

@@ -1,0 +1,46 @@
+"""Running means and variances by which states and rewards are scaled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+CLIP = 10.0  # Scaled states and rewards are clipped to this far from 0.
+EPSILON = 1e-8
+PRIOR = 1e-4  # Observations that the first mean, 0, and variance, 1, count for.
+
+
+class Moments:
+    """Mean and variance of a stream of vectors, one stream for each of S agents."""
+
+    def __init__(self, agents: int, size: int) -> None:
+        self.count = np.full((agents, 1), PRIOR)
+        self.mean = np.zeros((agents, size))
+        self.variance = np.ones((agents, size))
+
+    def see(self, values: np.ndarray) -> None:
+        """Takes in one vector for each agent, (S, size)."""
+        delta = values - self.mean
+        self.mean += delta / (self.count + 1.0)
+        self.variance += (delta * (values - self.mean) - self.variance) / (self.count + 1.0)
+        self.count += 1.0
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """Standard deviations (S, size), never 0."""
+        return np.sqrt(self.variance + EPSILON)
+
+
+class Returns:
+    """The deviation of each agent's discounted return so far, by which its rewards are divided."""
+
+    def __init__(self, agents: int, discount: float) -> None:
+        self._discount = discount
+        self.moments = Moments(agents, 1)
+        self.running = np.zeros((agents, 1))
+
+    def see(self, rewards: np.ndarray, ended: np.ndarray) -> None:
+        """Takes in one reward for each agent, (S,), and whether its episode ended there, (S,)."""
+        self.running *= self._discount
+        self.running += rewards[:, None]
+        self.moments.see(self.running)
+        self.running[ended] = 0.0

@@ -1,0 +1,58 @@
+"""The policy of the paper's learners: a Gaussian squashed by tanh, and the agent that plays its mean."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn.functional import softplus
+
+from baselines.networks import Stack
+from baselines.normalise import CLIP
+
+STATE = 48
+LOG_STD = (-20.0, 2.0)
+
+
+def head(outputs: Tensor) -> tuple[Tensor, Tensor]:
+    """Mean and logarithm of the deviation, each (S, B, 1), of a policy network's outputs (S, B, 2)."""
+    mean, log_std = outputs.split(1, dim=-1)
+    return mean, log_std.clamp(*LOG_STD)
+
+
+def sample(mean: Tensor, log_std: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
+    """Actions in (-1, 1) and their log probabilities, for standard normal noise; all (S, B, 1)."""
+    raw = mean + log_std.exp() * noise
+    return raw.tanh(), log_probability(raw, log_std, noise)
+
+
+def log_probability(raw: Tensor, log_std: Tensor, noise: Tensor) -> Tensor:
+    """Log density of tanh(raw), where raw lies `noise` deviations from its mean.
+
+    With log(1 - tanh(u)^2) = 2 (log 2 - u - softplus(-2 u)), exact where tanh has long rounded to 1.
+    """
+    gaussian = -0.5 * noise.square() - log_std - 0.5 * math.log(2.0 * math.pi)
+    return gaussian - 2.0 * (math.log(2.0) - raw - softplus(-2.0 * raw))
+
+
+class MeanAgent:
+    """Plays the tanh of the mean: the deterministic policy of one seed's weights."""
+
+    def __init__(self, weights: Mapping[str, np.ndarray]) -> None:
+        """Takes `mean` and `deviation` (48,) of states, and the policy's layers as `policy.0`, `policy.1`, ..."""
+        self._mean, self._deviation = (np.asarray(weights[name], np.float64) for name in ("mean", "deviation"))
+        layers = [np.asarray(weights[f"policy.{i}"], np.float32)[None] for i in range(6)]
+        self._network = Stack([torch.tensor(layer) for layer in layers])
+
+    def reset(self, episodes: np.ndarray) -> None:
+        """Has no memory."""
+
+    def act(self, states: np.ndarray) -> np.ndarray:
+        """Closing speeds (N, 1) for states (N, 48)."""
+        scaled = np.clip((states - self._mean) / self._deviation, -CLIP, CLIP)
+        with torch.inference_mode():
+            mean, _ = head(self._network(torch.tensor(scaled, dtype=torch.float32)[None]))
+            return mean.tanh()[0].double().numpy()

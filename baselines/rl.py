@@ -1,0 +1,48 @@
+"""RL: soft actor-critic without demonstrations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from dextron_bench.learning import Track, Trainer
+
+from baselines.cycle import Cycle
+from baselines.policy import MeanAgent
+from baselines.schedule import SCHEDULES, Preset, suffix
+
+
+@dataclass(frozen=True)
+class Rl:
+    """SAC that learns from its own episodes alone (paper, fig. 4a, "RL")."""
+
+    name: ClassVar[str] = "rl"
+    home: ClassVar[str] = ""
+
+    preset: Preset = "paper"
+    """How long to train: hours (paper), minutes (quick), seconds (smoke)."""
+
+    @property
+    def label(self) -> str:
+        """The method's name, and its preset where that is not the paper's."""
+        return self.name + suffix(self.preset)
+
+    @property
+    def period(self) -> int:
+        """Epochs between checkpoints."""
+        return SCHEDULES[self.preset].period
+
+    @property
+    def demonstrated(self) -> int:
+        """Expert transitions in each batch."""
+        return 0
+
+    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+        """One SAC agent a seed, side by side."""
+        return Cycle(track, seeds, SCHEDULES[self.preset], self.demonstrated)
+
+    def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
+        """Plays the policy's mean."""
+        return MeanAgent(weights)

@@ -1,0 +1,119 @@
+"""Soft actor-critic: targets and losses done by hand, gradients that stay in their networks, and a task it learns."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+
+from baselines import sac
+from baselines.sac import Batch, Sac
+
+
+def column(*numbers: float) -> torch.Tensor:
+    return torch.tensor(numbers)[None, :, None]
+
+
+def batch(rng: np.random.Generator, agents: int, size: int = 4) -> Batch:
+    def normal(width: int) -> torch.Tensor:
+        return torch.tensor(rng.normal(size=(agents, size, width)), dtype=torch.float32)
+
+    return Batch(normal(48), normal(1).tanh(), normal(1), normal(48), torch.ones(agents, size, 1))
+
+
+def agents(*seeds: int) -> Sac:
+    return Sac([np.random.default_rng(seed) for seed in seeds])
+
+
+def test_being_cut_off_bootstraps_but_a_fall_does_not():
+    target = sac.action_value_target(column(1.0, 1.0), column(1.0, 0.0), column(4.0, 4.0), discount=0.5)
+    assert_close(target, column(3.0, 1.0))
+
+
+def test_the_value_of_a_state_is_soft():
+    assert_close(sac.value_target(column(3.0, 3.0), column(-2.0, 0.5)), column(5.0, 2.5))
+
+
+def test_losses_by_hand():
+    assert_close(sac.squared_error(column(1.0, 5.0), column(2.0, 2.0)), torch.tensor([5.0]))
+    found = sac.policy_loss(column(2.0, 4.0), column(1.0, 1.0), column(1.0, 0.0), column(0.0, 2.0))
+    assert_close(found, torch.tensor([(1 - 2 + 0.001 + 1 - 4 + 0.004) / 2]))
+
+
+@pytest.mark.parametrize(("loss", "network"), [(0, "action_value"), (1, "value"), (2, "policy")])
+def test_each_loss_moves_its_own_network_alone(loss, network):
+    learner = agents(0)
+    learner.losses(batch(np.random.default_rng(1), 1), torch.zeros(1, 4, 1))[loss, 0].backward()
+    moved = {
+        name: any(p.grad is not None and p.grad.any() for p in getattr(learner, name).parameters)
+        for name in ("policy", "action_value", "value")
+    }
+    assert moved == {name: name == network for name in moved}
+
+
+def test_the_policys_gradient_goes_through_the_action():
+    """With Q(s, a) = -(a - 0.5)^2 the policy's mean comes to the action that is best, less what entropy asks for."""
+    mean = torch.zeros(1, 1, 1, requires_grad=True)
+    for _ in range(400):
+        action = mean.tanh()
+        loss = sac.policy_loss(-100 * (action - 0.5).square(), torch.zeros(1, 1, 1), mean, torch.zeros(1, 1, 1))
+        (slope,) = torch.autograd.grad(loss.sum(), mean)
+        mean = (mean - 0.01 * slope).detach().requires_grad_()
+    assert_close(mean.tanh(), column(0.5), atol=1e-3, rtol=0.0)
+
+
+def test_seeds_together_learn_what_each_learns_alone():
+    """The products are summed in another order, so the last bits may differ: 1e-4 after ten updates."""
+    together, alone = agents(3, 4), agents(4)
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        both, noise = batch(rng, 2), torch.tensor(rng.normal(size=(2, 4, 1)), dtype=torch.float32)
+        together.update(both, noise)
+        alone.update(Batch(*(getattr(both, name)[1:] for name in Batch.__slots__)), noise[1:])
+    for found, wanted in zip(together.learned, alone.learned, strict=True):
+        assert_close(found[1:], wanted, atol=1e-4, rtol=1e-3)
+
+
+def test_the_target_follows_the_value_by_the_polyak_coefficient():
+    learner = agents(0)
+    before = learner.target.parameters[0].clone()
+    learner.update(batch(np.random.default_rng(1), 1), torch.zeros(1, 4, 1))
+    wanted = before + 0.01 * (learner.value.parameters[0].detach() - before)
+    assert_close(learner.target.parameters[0], wanted)
+
+
+def test_what_was_saved_goes_on_bit_for_bit():
+    first, second = agents(0, 1), agents(7, 8)
+    rng = np.random.default_rng(2)
+    for _ in range(3):
+        first.update(batch(rng, 2), torch.zeros(2, 4, 1))
+    second.load(first.save())
+    more = batch(rng, 2)
+    assert torch.equal(first.update(more, torch.ones(2, 4, 1)), second.update(more, torch.ones(2, 4, 1)))
+    saved = second.save()
+    assert all((array == saved[name]).all() for name, array in first.save().items())
+
+
+@pytest.mark.slow
+def test_sac_learns_a_bandit_whose_answer_is_known():
+    """Rewards 20 a s on actions a in states s = -1 or 1, episodes of one step.
+
+    Then Q = 20 a s, and the best policy's density grows as exp(20 a s): its mean is s (coth 20 - 1/20) = 0.95 s.
+    """
+    learner, rng = agents(0, 1), np.random.default_rng(0)
+    for _ in range(3000):
+        signs = rng.choice([-1.0, 1.0], size=(2, 32, 1))
+        states = np.zeros((2, 32, 48))
+        states[..., :1] = signs
+        actions = rng.uniform(-1.0, 1.0, (2, 32, 1))
+        arrays = (states, actions, 20.0 * actions * signs, states, np.zeros((2, 32, 1)))
+        noise = torch.tensor(rng.normal(size=(2, 32, 1)), dtype=torch.float32)
+        learner.update(Batch(*(torch.tensor(array, dtype=torch.float32) for array in arrays)), noise)
+    states = torch.zeros(2, 1000, 48)
+    states[:, 500:, 0], states[:, :500, 0] = 1.0, -1.0
+    played = learner.act(states, torch.tensor(rng.normal(size=(2, 1000, 1)), dtype=torch.float32))
+    wanted = 1 / math.tanh(20) - 1 / 20
+    for agent in range(2):
+        assert abs(played[agent, 500:].mean() - wanted) < 0.05
+        assert abs(played[agent, :500].mean() + wanted) < 0.05
