@@ -2,16 +2,38 @@
 
 from __future__ import annotations
 
+import io
+import json
+import os
+import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from dextron_bench import likeness
-from dextron_bench.likeness_features import GROUPS, features, measures, summaries
+from dextron_bench import cli, likeness
+from dextron_bench.likeness_features import GROUPS, alone, features, measures, nearest, summaries
+from dextron_bench.verbs.data_model import compared, print_likeness
+from dextron_bench.world import archive
 from dextron_bench.world.reach import Reach
+from dextron_bench.world.synthetic import generate, load, shipped
+
+STUDY = """
+import sys
+from dataclasses import replace
+from dextron_bench import likeness
+from dextron_bench.world import archive
 from dextron_bench.world.synthetic import generate, shipped
+likeness.TREES, likeness.REPEATS, likeness.COUNT = 5, 20, 16
+made = [generate(number, shipped()) for number in (*range(16), *range(64, 80), *range(192, 208))]
+archive.load_reaches = lambda: [replace(r, name=f"{r.subject}_{k // 16}_{k % 16}") for k, r in enumerate(made)]
+likeness.fit = lambda reaches, seed: shipped()
+from dextron_bench.cli import main
+sys.exit(main())
+"""  # The command line with made-up recordings, of three subjects, and small classifiers.
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +151,100 @@ def test_summaries_pair_the_sources(reaches: list[Reach]):
     assert (np.diff(quantiles, axis=1) >= 0).all()
 
 
-def test_without_scikit_learn_the_user_is_told_what_to_do(reaches: list[Reach], monkeypatch: pytest.MonkeyPatch):
+def test_without_scikit_learn_the_user_is_told_what_to_do(
+    reaches: list[Reach], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
     with pytest.raises(likeness.MissingClassifiers, match=r"install dextron-bench\[dev\]"):
         likeness.report(reaches[:4], reaches[4:8], 0)
+    monkeypatch.setattr(archive, "load_reaches", lambda: reaches[:4])
+    monkeypatch.setattr(likeness, "fit", None)
+    assert cli.main(["data", "likeness"]) == 2
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err.count("\n")) == ("", 1)
+    assert "install dextron-bench[dev]" in printed.err
+
+
+@pytest.mark.parametrize("verb", ["fit", "likeness"])
+def test_without_recordings_the_user_is_told_how_to_get_them(
+    verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.delenv("DEXTRON_DATA", raising=False)
+    monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["data", verb]) == 2
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err.count("\n")) == ("", 1)
+    assert "data import --from" in printed.err
+    assert cli.main(["data", verb, "--seed", "-1"]) == 2
+    assert "a seed is 0 or more" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def stored(**arrays: list[float]) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, allow_pickle=False, **{name: np.array(values) for name, values in arrays.items()})
+    return file.getvalue()
+
+
+def test_fits_are_compared_by_bytes_then_by_numbers():
+    ours = stored(a=[1.0, 2.0, 5.0], b=[1.0])
+    assert compared(ours, ours) == "byte for byte the shipped file"
+    assert "every number" in compared(stored(b=[1.0], a=[1.0, 2.0, 5.0]), ours)
+    line = compared(stored(a=[1.0, 3.0, 5.0], b=[1.0]), ours)
+    assert "1 of 4 numbers differ, by at most 0.2 of the largest in their array (a)" in line
+    assert "a differ in shape" in compared(stored(a=[1.0], b=[1.0]), ours)
+
+
+def test_nearest_leaves_a_reach_itself_out(straight: Reach):
+    beside = replace(straight, positions=straight.positions + np.array([0.0, 0.0, 0.03]))
+    table = nearest([straight, beside], [replace(straight), straight]).set_index("source")
+    assert list(table["least"]) == [pytest.approx(0.03), pytest.approx(0.0, abs=1e-12)]
+
+
+def test_a_feature_alone_tells_a_shift(reaches: list[Reach]):
+    slow = replace(reaches[0], times=reaches[0].times * 2, reached=reaches[0].reached * 2)
+    table = alone([reaches[0], slow], [slow]).set_index("group")
+    assert table.loc["durations", "high"] == 0.75  # Beats one of two, ties with the other.
+    assert table.loc["durations", "low"] == pytest.approx(0.5)  # The share until the hand arrives is the same in all.
+
+
+@pytest.mark.slow
+def test_fit_makes_the_shipped_model_again(release: Path, tmp_path: Path):
+    """Numbers agree but for rounding, and the signs of components, which are free."""
+    into = tmp_path / "new" / "model.npz"
+    done = shell(["-m", "dextron_bench", "data", "fit", "--into", str(into)], tmp_path, DEXTRON_DATA=str(release))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"{into}: {into.stat().st_size:,} bytes, ")
+    assert "shipped file" in done.stdout
+    model = load(str(into))
+    for name in ("regions", "sessions", "slopes", "left", "subject_scales", "lags", "noise"):
+        np.testing.assert_allclose(getattr(model, name), getattr(shipped(), name), rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(abs(model.components), abs(shipped().components), rtol=0.01, atol=1e-4)
+
+
+@pytest.mark.slow
+def test_likeness_prints_json_and_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    done = shell(["-c", STUDY, "data", "likeness", "--json"], tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    tables = json.loads(done.stdout)
+    assert list(tables) == ["held out", "alone", "nearest", "distributions", "strangers"]
+    assert len(tables["held out"]) == 6 * 2 * (1 + 4 + 4 + 16)
+    assert len(tables["strangers"]) == 6 * 2 * 2
+    assert {(row["real"], row["synthetic"]) for row in tables["held out"] if row["stratum"] == "all"} == {(48, 96)}
+    assert tables["nearest"][1]["least"] == 0.0  # The same reaches are recorded and shipped.
+    print_likeness({name: pd.DataFrame(rows) for name, rows in tables.items()})
+    printed = capsys.readouterr().out
+    for row in tables["held out"]:
+        if row["stratum"] == "all":
+            assert f"{row['auc']:.2f} [{row['low']:.2f}, {row['high']:.2f}]" in printed
+        elif row["classifier"] == "forest":
+            assert f"{row['auc']:.2f} ±{(row['high'] - row['low']) / 2:.2f}" in printed
+
+
+def shell(words: list[str], folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs the interpreter in a process of its own."""
+    inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
+    cache = {"DEXTRON_CACHE": str(folder / "cache")}
+    command, everything = [sys.executable, *words], {**inherited, **cache, **environment}
+    return subprocess.run(command, env=everything, capture_output=True, text=True, timeout=600)

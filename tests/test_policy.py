@@ -18,7 +18,7 @@ def one(number: float) -> torch.Tensor:
 def test_the_density_is_the_gaussians_over_the_slope_of_tanh():
     mean, deviation, noise = 0.3, 0.5, 1.2
     raw = mean + deviation * noise  # 0.9
-    wanted = norm.logpdf(raw, mean, deviation) - math.log(1.0 - math.tanh(raw) ** 2)
+    wanted = float(norm.logpdf(raw, mean, deviation)) - math.log(1.0 - math.tanh(raw) ** 2)
     action, found = policy.sample(one(mean), one(math.log(deviation)), one(noise))
     assert_close(found, one(wanted))
     assert_close(action, one(math.tanh(0.9)))

@@ -112,13 +112,17 @@ class Likeness:
 def print_likeness(tables: dict[str, pd.DataFrame]) -> None:
     """The tables of `likeness.study` on stdout."""
     held_out, strangers = with_interval(tables["held out"]), with_interval(tables["strangers"])
-    forest = held_out[held_out["classifier"] == "forest"]
-    print_pivot("AUC [95 %], models without the reaches judged", held_out[held_out["stratum"] == "all"], "classifier")
-    print_pivot("AUC [95 %] of the forest by ring, angle and start region", forest, "group", rows="stratum")
-    for classifier, rows in strangers.groupby("classifier", sort=False):
-        print_pivot(f"AUC [least, most of three] for strangers, {classifier}", rows, "beside")
-    for name in ("alone", "nearest", "distributions"):
-        print_table(name, [str(column) for column in tables[name]], tables[name].itertuples(index=False))
+    whole = held_out[held_out["stratum"] == "all"]
+    print_pivot("AUC [95 %], by models without the reaches judged", whole, "group", "classifier")
+    for group, found in held_out[held_out["classifier"] == "forest"].groupby("group", sort=False):
+        print_places(f"AUC ± half of 95 % interval, forest, {group}", found)
+    for classifier, found in strangers.groupby("classifier", sort=False):
+        print_pivot(f"AUC for strangers, mean and range of splits, {classifier}", found, "group", "beside")
+    print_rows("least and greatest AUC of a single feature", tables["alone"])
+    distances = tables["nearest"].set_index("source") * 1000.0
+    print_rows("mm to the nearest other recording, quantiles", distances.reset_index())
+    names = tables["distributions"]["measure"].str.replace("[", "in ").str.rstrip("]")
+    print_rows("quantiles", tables["distributions"].assign(measure=names))
 
 
 def with_interval(table: pd.DataFrame) -> pd.DataFrame:
@@ -127,7 +131,22 @@ def with_interval(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(cell=cells)
 
 
-def print_pivot(title: str, table: pd.DataFrame, columns: str, rows: str = "group") -> None:
+def print_places(title: str, table: pd.DataFrame) -> None:
+    """AUCs of one group and classifier on stdout: rings down, angles across, and all of either."""
+    places = {
+        row["stratum"]: f"{row['auc']:.2f} ±{(row['high'] - row['low']) / 2:.2f}" for row in table.to_dict("records")
+    }
+    rings, angles = ([name for name in places if name.startswith(kind)] for kind in ("ring", "angle"))
+    rows = [[ring, *(places.get(f"{ring[-1]}-{angle[-1]}", "") for angle in angles), places[ring]] for ring in rings]
+    print_table(title, ["", *angles, "all"], [*rows, ["all", *(places[angle] for angle in angles), places["all"]]])
+
+
+def print_pivot(title: str, table: pd.DataFrame, rows: str, columns: str) -> None:
     """Cells of a table on stdout, one row and one column for each of their values in two columns."""
     wide = table.set_index([rows, columns])["cell"].unstack(sort=False)
     print_table(title, [rows, *wide.columns], wide.reset_index().to_numpy().tolist())
+
+
+def print_rows(title: str, table: pd.DataFrame) -> None:
+    """A table on stdout as it is."""
+    print_table(title, [str(column) for column in table.columns], table.itertuples(index=False))
