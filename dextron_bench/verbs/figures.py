@@ -22,12 +22,13 @@ class Figures:
     """Points in figure 3a at most."""
 
     def __call__(self) -> int:
-        from dextron_bench import database, figures, pictures
+        from dextron_bench import database, figures, partition, pictures
         from dextron_bench.world.sources import open_source
 
         source = open_source(self.reaches)
         self.into.mkdir(parents=True, exist_ok=True)
-        solved = database.shipped(self.reaches)[0].query("score == 20").head(self.rows)
+        solved = database.shipped(self.reaches)[0].query("score == 20")
+        solved = solved.drop_duplicates(partition.SETTING).head(self.rows)
         starts, paths = (self.into / f"fig3{part}-{self.reaches}.png" for part in "ab")
         figures.start_points(source, solved, starts)
         figures.reach_paths(source, paths)
