@@ -6,14 +6,17 @@ verbs import nothing heavy, so that help is quick.
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import redirect_stderr
 from typing import Annotated, Any, Protocol, Union
 
 import tyro
 
-from dextron_bench.verbs import data, data_model, doctor, figures, leaderboard, mc, run, splits, view
+from dextron_bench.verbs import data, data_model, doctor, figures, leaderboard, mc, run, settings, splits, view
+from dextron_bench.verbs import eval as evaluation
 from dextron_bench.verbs import list as listing
 
 
@@ -27,6 +30,7 @@ Group = tuple[str, dict[str, type[Verb]]]  # What a group of verbs is about, and
 
 VERBS: dict[str, type[Verb] | Group] = {
     "run": run.Run,
+    "eval": evaluation.Eval,
     "leaderboard": leaderboard.Leaderboard,
     "view": view.View,
     "list": listing.List,
@@ -89,7 +93,25 @@ def explain(error: BaseException) -> tuple[int, str]:
 
 
 def _parse(words: Sequence[str]) -> Verb:
-    return tyro.cli(_union(VERBS), prog="dextron-bench", description=DESCRIPTION, args=words)
+    """The verb that words ask for; wrong ones end the process with a line and code 2."""
+    if words and words[0] in settings.VERBS:
+        verbs: dict[str, Any] = {**VERBS, words[0]: settings.widen(words, VERBS[words[0]])}
+        with settings.blaming(words):
+            return _told(verbs, words)
+    return _told(VERBS, words)
+
+
+def _told(verbs: Mapping[str, type[Verb] | Group], words: Sequence[str]) -> Verb:
+    """The verb; what is wrong with words is told in a line, where tyro has a frame of many."""
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said):
+            return tyro.cli(_union(verbs), prog="dextron-bench", description=DESCRIPTION, args=words)
+    except SystemExit as ended:
+        if ended.code:
+            verb = " ".join(["dextron-bench", *(word for word in words[:1] if word in verbs)])
+            print(f"dextron-bench: {settings.in_a_line(said.getvalue())}; see `{verb} --help`", file=sys.stderr)
+        raise
 
 
 def _union(verbs: Mapping[str, type[Verb] | Group]) -> Any:

@@ -7,17 +7,28 @@ import importlib
 import importlib.util
 import re
 import sys
-from collections.abc import Callable
-from dataclasses import asdict, is_dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields, is_dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeAlias
 
-from dextron_bench.rollout import Agent, blaming
+from dextron_bench.learning import Heir, Learner
+from dextron_bench.rollout import Agent, AgentError, blaming
 
 GROUP = "dextron_bench.methods"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")  # A run's folder is called like its method.
+ENTRANT = "dextron_entrant_"  # What the names of modules made of files begin with.
+PAPER: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of its figure 4a, which `run --all` makes.
+    ("exp", {}),
+    ("sim", {}),
+    ("sor", {}),
+    ("bc", {}),
+    ("rl", {}),
+    ("rlil", {"dur": 0.1}),
+    ("rlil", {"dur": 0.3}),
+)
 
 
 class Method(Protocol):
@@ -30,6 +41,9 @@ class Method(Protocol):
         ...
 
 
+Entrant: TypeAlias = Method | Learner | Heir
+
+
 class UnknownMethod(KeyError):
     """A method that is not there, or is none."""
 
@@ -37,12 +51,16 @@ class UnknownMethod(KeyError):
         return str(self.args[0])
 
 
+class BadSettings(ValueError):
+    """Settings that a method does not have, or refuses."""
+
+
 def known() -> tuple[str, ...]:
     """Names of the installed methods."""
     return tuple(sorted(entry_points(group=GROUP).names))
 
 
-def find(spec: str) -> type[Method]:
+def find(spec: str) -> type[Entrant]:
     """The method's class; raises UnknownMethod with what would be right."""
     if ":" not in spec:
         found = list(entry_points(group=GROUP, name=spec))
@@ -56,20 +74,57 @@ def find(spec: str) -> type[Method]:
     return _checked(spec, getattr(module, name, None))
 
 
-def create(spec: str) -> Method:
-    """The method with its default settings; raises UnknownMethod, AgentError."""
+def create(spec: str, settings: Mapping[str, Any] | None = None) -> Entrant:
+    """The method with these settings, defaults elsewhere; raises UnknownMethod, BadSettings, AgentError."""
     found = find(spec)
-    with blaming(f"making method {spec!r}"):
-        return found()
+    try:
+        with blaming(f"making method {spec!r}"):
+            made = found(**(settings or {}))
+            called = label(made)
+    except AgentError as error:
+        if isinstance(error.__cause__, ValueError):
+            raise BadSettings(f"method {spec!r}: {error.__cause__}") from error
+        raise
+    if not isinstance(called, str) or not NAME.fullmatch(called):
+        raise UnknownMethod(f"{spec!r} has the label {called!r}: use letters, digits and . _ + -, as in 'rlil-0.1'")
+    return made
+
+
+def paper(preset: str) -> list[tuple[str, dict[str, Any]]]:
+    """The methods of the paper's table with their settings; those that train do so for as long as `preset` says."""
+    return [
+        (spec, settings | ({"preset": preset} if hasattr(find(spec), "preset") else {})) for spec, settings in PAPER
+    ]
+
+
+def words(spec: str, settings: Mapping[str, Any]) -> str:
+    """What to write on the command line for a method with settings, those that are its defaults left out."""
+    own = {field.name: field.default for field in fields(found)} if is_dataclass(found := find(spec)) else {}
+    flags = [f"--{name.replace('_', '-')} {value}" for name, value in settings.items() if value != own.get(name)]
+    return " ".join([f"--method {spec}", *flags])
+
+
+def label(method: Entrant) -> str:
+    """What a method's runs and rows are called: its `label`, or its name where it has none."""
+    return getattr(method, "label", method.name)
+
+
+def home(method: Entrant, reaches: str) -> str:
+    """The source of reaches of a method's run that was asked for on `reaches`."""
+    return (getattr(method, "home", "") if isinstance(method, Learner) else "") or reaches
 
 
 def origin(spec: str) -> dict[str, str | None]:
     """Where a method's code is from: its class, and for a file the SHA-256 of its content."""
-    place, _, name = spec.rpartition(":")
-    if place.endswith(".py"):
-        return {"class": f"{Path(place).name}:{name}", "sha256": hashlib.sha256(Path(place).read_bytes()).hexdigest()}
-    found = find(spec)
-    return {"class": f"{found.__module__}:{found.__qualname__}", "sha256": None}
+    return origin_of(find(spec))
+
+
+def origin_of(found: type) -> dict[str, str | None]:
+    """The same of a class that was found already."""
+    called, digest = found.__module__, None
+    if called.startswith(ENTRANT) and (file := sys.modules[called].__file__):
+        called, digest = Path(file).name, hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    return {"class": f"{called}:{found.__qualname__}", "sha256": digest}
 
 
 def describe(name: str) -> str:
@@ -80,14 +135,18 @@ def describe(name: str) -> str:
         return str(error)
 
 
-def settings(method: Method) -> dict[str, Any]:
+def settings(method: Entrant) -> dict[str, Any]:
     """A method's settings as plain values."""
     return asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
 
 
-def _checked(spec: str, found: Any) -> type[Method]:
-    if not isinstance(found, type) or not hasattr(found, "agent") or not hasattr(found, "name"):
-        raise UnknownMethod(f"{spec!r} is not a method: it needs to be a class with `name` and `agent(seed)`")
+def _checked(spec: str, found: Any) -> type[Entrant]:
+    offers = [name for name in ("agent", "trainer", "teacher") if hasattr(found, name)]
+    if not isinstance(found, type) or not offers or not hasattr(found, "name"):
+        raise UnknownMethod(
+            f"{spec!r} is not a method: it needs to be a class with `name` and `agent(seed)`, "
+            "or what dextron_bench/learning.py asks of one that trains"
+        )
     if not isinstance(found.name, str) or not NAME.fullmatch(found.name):
         raise UnknownMethod(f"{spec!r} has the name {found.name!r}: use letters, digits and . _ + -, as in 'my-method'")
     return found
@@ -108,7 +167,7 @@ def _from_file(spec: str, place: str) -> ModuleType:
     file = Path(place).resolve()
     if not file.is_file():
         raise UnknownMethod(f"method {spec!r}: there is no file {place}")
-    name = f"dextron_entrant_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
+    name = f"{ENTRANT}{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]
     loaded = importlib.util.spec_from_file_location(name, file)

@@ -132,25 +132,29 @@ def build(
     sizes = sizes or Sizes()
     parts = partition(source, database, seed, sizes, by_subject=source.name == "real")
     parts["open"] = draw_open(source, parts.values(), seed, sizes)
-    tables = [_scanned(source, name, parts[name], engine, sizes) for name in splits.NAMES[1:] if name in parts]
+    tables = [scanned(source, name, parts[name], engine, sizes.scan) for name in splits.NAMES[1:] if name in parts]
     solved = parts["train"].groupby(SETTING)["score"].transform("size").to_numpy()
     tables.insert(0, parts["train"].assign(window=RANGE * solved / tried, split="train")[COLUMNS])
-    table = pd.concat(tables, ignore_index=True)
-    provenance.write_whole(folder / f"splits-{source.name}.parquet", lambda part: table.to_parquet(part))
+    return write(source.name, pd.concat(tables, ignore_index=True), folder)
+
+
+def write(reaches: str, table: pd.DataFrame, folder: Path) -> dict[str, dict[str, Any]]:
+    """Writes a source's splits, one after another in `table`, into `folder`; returns their entry in its catalogue."""
+    provenance.write_whole(folder / f"splits-{reaches}.parquet", lambda part: table.to_parquet(part))
     entry = {
         str(name): {"rows": len(rows), "digest": splits.digest(rows)}
         for name, rows in table.groupby("split", sort=False)
     }
     catalogue = folder / "splits.json"
     others = json.loads(catalogue.read_text(encoding="utf-8")) if catalogue.exists() else {}
-    provenance.write_json(catalogue, others | {source.name: entry})
+    provenance.write_json(catalogue, others | {reaches: entry})
     return entry
 
 
-def _scanned(source: setting.Source, name: str, rows: pd.DataFrame, engine: Engine, sizes: Sizes) -> pd.DataFrame:
+def scanned(source: setting.Source, name: str, rows: pd.DataFrame, engine: Engine, points: int) -> pd.DataFrame:
     """A split's rows with their windows, and for `open` with the best d_c of the scan."""
     once = rows.drop_duplicates(SETTING)
-    scores = scan(source, once, engine, sizes.scan)
+    scores = scan(source, once, engine, points)
     if name == "open":
         rows = rows.assign(critical=best(scores))
     widths = once[SETTING].assign(window=window(scores))

@@ -1,11 +1,15 @@
 """Splits keep apart what they promise to, and difficulty is what a scan finds."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench import partition
+from dextron_bench import cli, experts, partition, partition_minjerk, splits
+from dextron_bench.experts import ExpertAgent
 from dextron_bench.partition import Sizes, TooFewRows
+from dextron_bench.rollout import rollout
 from dextron_bench.world import setting
 from dextron_bench.world.engine import Engine
 from dextron_bench.world.minjerk import MinjerkSource
@@ -112,3 +116,56 @@ def test_a_scan_plays_each_row_with_its_own_gain():
     np.testing.assert_array_equal(scores, swapped[::-1])
     assert scores[0, 0] > 1  # Closes at d_c = 0.158, as the paper's expert of this world.
     assert scores[0, 2] == 0  # Closes at 0.752, long before it comes to the bottle.
+
+
+# `minjerk`, where there is one expert and no offset.
+
+FEW = partition_minjerk.Sizes(train=2, val=1, test=2, scan=2, batch=3)
+
+
+@pytest.fixture(scope="module")
+def minjerk() -> dict[str, pd.DataFrame]:
+    return partition_minjerk.draw(MinjerkSource(), Engine(8, 1), 0, FEW)
+
+
+def test_minjerk_trains_on_listed_reaches_and_holds_out_further_ones(minjerk):
+    assert {name: len(rows) for name, rows in minjerk.items()} == {"train": 2, "val": 1, "test": 2}
+    reaches = [name for rows in minjerk.values() for name in rows["reach"]]
+    assert len(set(reaches)) == 5
+    listed = set(MinjerkSource().names)
+    assert [name in listed for name in reaches] == [True] * 2 + [False] * 3
+
+
+def test_minjerk_rows_are_solved_by_its_one_expert_in_a_drawn_order(minjerk):
+    source, rows = MinjerkSource(), pd.concat(minjerk.values())
+    assert set(zip(rows["gain"], rows["critical"], strict=True)) == {(2.0, 0.15)}
+    played = dict(rollout(ExpertAgent(), source, splits.cases(rows.assign(window=0.0)), threads=1))
+    assert [episode.score for episode in played.values()] == [20.0] * 5
+    drawn = np.random.default_rng([0, 0, 3]).permutation(1000)
+    order = [f"minjerk-{number:06d}" for number in drawn]
+    assert [order.index(name) for name in minjerk["train"]["reach"]] == sorted(
+        map(order.index, minjerk["train"]["reach"])
+    )
+
+
+def test_unsolved_minjerk_reaches_are_passed_over(monkeypatch):
+    monkeypatch.setattr(partition_minjerk, "EXPERT", experts.Expert(2.0, 0.9))  # Hits the bottle with a closed hand.
+    with pytest.raises(TooFewRows, match="1 solved minjerk reaches are asked for and there are 0"):
+        partition_minjerk.solved(MinjerkSource(), np.arange(4), 1, Engine(4, 1), batch=2)
+
+
+def test_minjerk_is_written_beside_the_other_sources(tmp_path):
+    (tmp_path / "splits.json").write_text('{"real": {}}')
+    entry = partition_minjerk.build(tmp_path, Engine(8, 1), 0, FEW)
+    assert json.loads((tmp_path / "splits.json").read_text()) == {"real": {}, "minjerk": entry}
+    table = pd.read_parquet(tmp_path / "splits-minjerk.parquet")
+    assert table.columns.tolist() == partition.COLUMNS
+    assert table["split"].tolist() == ["train"] * 2 + ["val"] + ["test"] * 2
+    assert set(table["window"]) <= {0.0, 0.445, 0.89}
+    assert entry["val"]["digest"] == splits.digest(table[table["split"] == "val"])
+
+
+def test_only_minjerk_does_without_a_database(tmp_path, capsys):
+    assert cli.main(["splits", "--reaches", "synthetic", "--into", str(tmp_path)]) == 2
+    assert "splits of synthetic reaches need --database" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -13,10 +13,11 @@ import pandas as pd
 import pytest
 import tiny
 
-from dextron_bench import provenance, recording, run, splits
+from dextron_bench import provenance, recording, records, run, splits
 from dextron_bench.experts import ExpertAgent
+from dextron_bench.records import DamagedRun, RunMismatch
 from dextron_bench.rollout import rollout
-from dextron_bench.run import DamagedRun, Plan, RunMismatch
+from dextron_bench.run import Plan
 
 PLAN = Plan("exp", "synthetic", ("val", "test"), seed=0)
 AGENT = """
@@ -107,7 +108,7 @@ def test_killed_between_its_first_two_files_it_still_ends(tmp_path: Path, monkey
 
 def test_the_result_is_what_the_episodes_say(tmp_path: Path):
     folder = play(tmp_path)
-    episodes, result = pd.read_parquet(folder / "episodes.parquet"), run.read_result(folder / "result.json")
+    episodes, result = pd.read_parquet(folder / "episodes.parquet"), records.read_result(folder / "result.json")
     assert (result["method"], result["reaches"], result["seed"]) == ("exp", "synthetic", 0)
     assert set(result["splits"]) == {"val", "test"}
     for name, found in result["splits"].items():
@@ -143,7 +144,7 @@ def test_a_missing_recording_is_made_and_one_that_cannot_be_is_not_missed(
     plan = Plan(spec, "synthetic", ("open",), seed=0, record=1)
     folder = play(tmp_path, plan)
     assert made == []  # An episode that failed before its first step.
-    assert run.read_result(folder / "result.json")["splits"]["open"] == {
+    assert records.read_result(folder / "result.json")["splits"]["open"] == {
         "digest": splits.load("synthetic", "open").digest, "scores": [0.0], "failed": 1,
     }  # fmt: skip
     monkeypatch.setattr(run, "rollout", forbid)
@@ -154,7 +155,7 @@ def test_a_missing_recording_is_made_and_one_that_cannot_be_is_not_missed(
 def test_splits_are_added_to_a_run(tmp_path: Path):
     play(tmp_path, Plan("nothing", "synthetic", ("val",), 0))
     folder = play(tmp_path, Plan("nothing", "synthetic", ("open",), 0))
-    assert set(run.read_result(folder / "result.json")["splits"]) == {"val", "open"}
+    assert set(records.read_result(folder / "result.json")["splits"]) == {"val", "open"}
 
 
 def test_a_changed_split_is_played_again(tmp_path: Path):
@@ -168,7 +169,8 @@ def test_a_changed_split_is_played_again(tmp_path: Path):
     episodes = pd.read_parquet(folder / "episodes.parquet")
     assert episodes["offset_x"].tolist() == [0.03]
     assert (
-        run.read_result(folder / "result.json")["splits"]["open"]["digest"] == splits.load("synthetic", "open").digest
+        records.read_result(folder / "result.json")["splits"]["open"]["digest"]
+        == splits.load("synthetic", "open").digest
     )
 
 
@@ -225,10 +227,10 @@ def test_a_damaged_result_is_named(tmp_path: Path, text: str):
     place = tmp_path / "a" / "real" / "seed0" / "result.json"
     place.parent.mkdir(parents=True)
     place.write_text(json.dumps(RESULT))
-    assert list(run.results(tmp_path)) == [RESULT]
+    assert list(records.results(tmp_path)) == [RESULT]
     place.write_text(text)
     with pytest.raises(DamagedRun, match=r"result\.json is damaged"):
-        list(run.results(tmp_path))
+        list(records.results(tmp_path))
 
 
 def test_progress_is_told_in_order(tmp_path: Path):

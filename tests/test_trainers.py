@@ -66,18 +66,16 @@ def test_equal_seeds_learn_equally_and_others_do_not(kind: str, tmp_path: Path):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_seed_learns_beside_others_what_it_learns_alone(kind: str, tmp_path: Path):
-    """Up to the order in which a product is summed: 1e-4 of the weights after ten updates.
+    """Up to the order in which a product is summed, which physics and Adam's steps blow up: see the losses.
 
-    Later on, Adam's steps, which divide a gradient by its own size, blow such differences up.
+    `test_sac.py` compares the weights, where there is no physics.
     """
     schedule = Schedule(epochs=4, warm_start=150, period=1)
     together, alone = trainer(kind, tmp_path, (0, 1), schedule), trainer(kind, tmp_path, (1,), schedule)
-    for each in (together, alone):
-        each.advance()
-        each.advance()
-    found, wanted = together.weights()[1], alone.weights()[0]
-    for name, array in wanted.items():
-        np.testing.assert_allclose(found[name], array, atol=1e-4, rtol=1e-3, err_msg=name)
+    together.advance(), alone.advance()
+    (other, found), (wanted,) = together.advance(), alone.advance()
+    assert found == pytest.approx(wanted, rel=1e-2)
+    assert other != pytest.approx(wanted, rel=1e-2)
 
 
 @pytest.mark.parametrize("kind", KINDS)

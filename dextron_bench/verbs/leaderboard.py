@@ -25,9 +25,9 @@ class Leaderboard:
     """Print the rows as JSON."""
 
     def __call__(self) -> int:
-        from dextron_bench import leaderboard, run
+        from dextron_bench import leaderboard, records
 
-        print_rows(leaderboard.table(run.results(self.runs)), self.json)
+        print_rows(leaderboard.table(records.results(self.runs)), self.json)
         return 0
 
 

@@ -19,13 +19,16 @@ class List:
     """Folder of all runs."""
 
     def __call__(self) -> int:
-        from dextron_bench import methods, run, splits
+        from dextron_bench import lessons, methods, records, splits
 
         about = [(name, methods.describe(name)) for name in methods.known()]
         found = [splits.load(*names) for names in splits.everything()]
         rows = [(split.reaches, split.name, len(split.cases), split.digest[:8]) for split in found]
         print_table("methods", ["name", "what it is"], about)
         print_table("splits", ["reaches", "split", "rows", "version"], rows)
-        done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in run.results(self.runs)]
+        done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in records.results(self.runs)]
+        under_way = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in lessons.under_way(self.runs)]
+        if under_way:
+            print_table(f"trainings in {self.runs}", ["method", "reaches", "seeds", "left"], under_way)
         print_table(f"runs in {self.runs}", ["method", "reaches", "seed", "splits"], done)
         return 0

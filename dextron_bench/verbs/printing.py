@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 RATE_OVER = 300.0  # [s] over which rate and time left are estimated; a search's blocks take up to a minute.
 
@@ -34,11 +34,17 @@ def print_json(value: Any) -> None:
     print(json.dumps(value, indent=1))
 
 
+class Told(Protocol):
+    """Hears how far something is, and how it goes."""
+
+    def __call__(self, done: int, total: int, note: str = "") -> None: ...
+
+
 @contextmanager
-def progress_bar(title: str, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
+def progress_bar(title: str, quiet: bool = False) -> Iterator[Told]:
     """A bar with count, rate and time left on stderr, told of (done, all); silent when quiet or off a terminal."""
     if quiet or not sys.stderr.isatty():
-        yield lambda done, total: None
+        yield lambda done, total, note="": None
         return
     from rich.console import Console
     from rich.progress import (
@@ -53,12 +59,13 @@ def progress_bar(title: str, quiet: bool = False) -> Iterator[Callable[[int, int
     columns = (
         *(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}")),
         *(TimeElapsedColumn(), TextColumn("gone,"), TimeRemainingColumn(), TextColumn("left")),
+        TextColumn("{task.fields[note]}"),
     )
     with Progress(*columns, console=Console(stderr=True), speed_estimate_period=RATE_OVER) as bars:
-        task = bars.add_task(title, total=None, rate="")
+        task = bars.add_task(title, total=None, rate="", note="")
 
-        def told(done: int, total: int) -> None:
-            bars.update(task, completed=done, total=total or None)
+        def told(done: int, total: int, note: str = "") -> None:
+            bars.update(task, completed=done, total=total or None, note=note)
             bars.update(task, rate=_rate(bars.tasks[0].speed))
 
         yield told

@@ -1,29 +1,40 @@
-"""`dextron-bench run`: evaluate a method, record episodes, print its rows."""
+"""`dextron-bench run`: train a method, evaluate it, record episodes, print its rows."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import tyro
 
 from dextron_bench.verbs.leaderboard import print_rows
-from dextron_bench.verbs.printing import progress_bar
+from dextron_bench.verbs.printing import print_json, print_table, progress_bar
+from dextron_bench.verbs.settings import chosen
+
+if TYPE_CHECKING:
+    from dextron_bench.run import Plan
 
 EPISODES_FAILED = 3
+FLOORS = ("nothing", "random")
 
 
 @dataclass(frozen=True)
 class Run:
     """Run a method on the splits of a source of reaches, beside the floors, and print the leaderboard.
 
-    What a run folder already holds is not computed again: the same command goes on where it was stopped.
+    A method that learns is trained first, all seeds together. A method's own settings are flags too:
+    `dextron-bench run --method rlil --help` shows them. What a run folder already holds is not computed again:
+    the same command goes on where it was stopped.
 
-    Example: dextron-bench run --method exp --reaches synthetic --split test --seed 0 1 2 --record 3
+    Example: dextron-bench run --method rlil --dur 0.1 --preset smoke --reaches synthetic --seed 0 1 2
     """
 
     method: str = "exp"
     """A method's name (see `dextron-bench list`), module:Class or file.py:Class."""
-    reaches: Literal["real", "synthetic"] = "synthetic"
+    all: bool = False
+    """Run every method of the paper's table in place of one; --preset then holds for all that train."""
+    reaches: Literal["real", "synthetic", "minjerk"] = "synthetic"
     """The source of reaches."""
     split: tuple[str, ...] = ()
     """The splits to evaluate on; by default all that rank methods."""
@@ -37,25 +48,68 @@ class Run:
     """Folder of all runs."""
     threads: int = 0
     """Threads of the simulation; 0 takes one for each processor. Results do not depend on it."""
+    device: Literal["cpu", "cuda", "auto"] = "cpu"
+    """What networks are trained on; auto takes a GPU where there is one. The last bits depend on it."""
+    dry_run: bool = False
+    """Only say what there is to do and about how long it takes."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
     """Print the rows as JSON."""
+    settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
-        from dextron_bench import leaderboard, run, splits
+        groups = self._groups()
+        return self._foretell(groups) if self.dry_run else self._execute(groups)
 
-        names = self.split or splits.evaluated(self.reaches)
-        floors = [name for name in ("nothing", "random") if self.floors and name != self.method]
-        plans = [run.Plan(self.method, self.reaches, names, seed, self.record) for seed in self.seed]
-        plans += [run.Plan(name, self.reaches, names, seed) for name in floors for seed in self.seed]
+    def _groups(self) -> list[list[Plan]]:
+        """What to run: methods, each with its seeds."""
+        from dextron_bench import methods, run, splits
+
+        asked = methods.paper(**chosen(self.settings)) if self.all else [(self.method, chosen(self.settings))]
+        plans = [run.Plan(spec, self.reaches, self.split, 0, self.record, settings) for spec, settings in asked]
+        plans += [run.Plan(name, self.reaches, self.split, 0) for name in FLOORS if self.floors and name != self.method]
+        plans = [replace(plan, splits=plan.splits or splits.evaluated(plan.home)) for plan in plans]
+        return [[replace(plan, seed=seed) for seed in dict.fromkeys(self.seed)] for plan in plans]
+
+    def _execute(self, groups: list[list[Plan]]) -> int:
+        from dextron_bench import leaderboard, records, run
+
         found = []
-        for plan in plans:
-            with progress_bar(f"{plan.method}, seed {plan.seed}", self.quiet) as progress:
-                folder = run.execute(plan, self.runs, self.threads, progress)
-            found.append(run.read_result(folder / run.RESULT))
-            if plan.record and not self.json:
-                print(f"{folder}: results, provenance and recordings; open one with `dextron-bench view {folder}`")
+        for plans in groups:
+            with progress_bar(f"{plans[0].label}, epochs", self.quiet) as progress:
+                run.learn(plans, self.runs, self.threads, self.device, progress)
+            for plan in plans:
+                with progress_bar(f"{plan.label}, seed {plan.seed}", self.quiet) as progress:
+                    folder = run.execute(plan, self.runs, self.threads, progress)
+                found.append(records.read_result(folder / records.RESULT))
+                if plan.record and not self.json:
+                    print(f"{folder}: results, provenance and recordings; open one with `dextron-bench view {folder}`")
         rows = leaderboard.table(found)
-        print_rows(rows[rows["split"].isin(names)], self.json)
+        rows = rows[rows["split"].isin({name for plans in groups for name in plans[0].splits})]
+        print_rows(rows, self.json)
         return EPISODES_FAILED if rows["failed"].any() else 0
+
+    def _foretell(self, groups: list[list[Plan]]) -> int:
+        from dextron_bench.outlook import outlook
+
+        rows = outlook(groups, self.runs, self.threads, self.device)
+        if self.json:
+            print_json(rows)
+            return 0
+        cells = [
+            [row["what"], row["method"], row["reaches"], " ".join(map(str, row["seeds"])), row["left"], told(row)]
+            for row in rows
+        ]
+        print_table("left to do", ["what", "method", "reaches", "seeds", "left", "time"], cells)
+        return 0
+
+
+def told(row: dict[str, Any]) -> str:
+    """About how long something takes, in words."""
+    seconds = row["seconds"]
+    if seconds is None:
+        return "unknown"
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,160 @@
+"""The files of a run: whose it is, its episodes, its recordings and its result."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from dextron_bench import methods, provenance, splits
+from dextron_bench.rollout import Episode
+from dextron_bench.world import model, setting
+
+CONFIG = "config.json"
+PROVENANCE = "provenance.json"
+EPISODES = "episodes.parquet"
+RESULT = "result.json"
+
+
+class RunMismatch(ValueError):
+    """A run folder that holds something else than what is asked for."""
+
+
+class DamagedRun(ValueError):
+    """A file of a run that is not whole; the message names it and says what to do."""
+
+    def __init__(self, file: Path, why: object) -> None:
+        super().__init__(f"{file} is damaged ({why}); remove it and run again")
+
+
+def config(method: methods.Entrant, reaches: str, seed: int) -> dict[str, Any]:
+    """What a method's run depends on, as `config.json` says it."""
+    return {
+        "method": method.name,
+        "code": methods.origin_of(type(method)),
+        "settings": methods.settings(method),
+        "reaches": reaches,
+        "seed": seed,
+        "physics": model.mjcf_hash(),
+    }
+
+
+def check(folder: Path, config: dict[str, Any]) -> None:
+    """Raises RunMismatch where the folder holds a run of another config, DamagedRun where that cannot be told."""
+    file = folder / CONFIG
+    if not file.exists():
+        return
+    found, wanted = read_json(file), json.loads(json.dumps(config))
+    if other := [name for name in wanted if found.get(name) != wanted[name]]:
+        raise RunMismatch(
+            f"{folder} holds a run with other {' and '.join(other)}; remove it, or choose another folder with --runs"
+        )
+
+
+def claim(folder: Path, config: dict[str, Any]) -> None:
+    """Makes the folder the run's that has this config; raises what `check` does."""
+    if not (folder / CONFIG).exists():  # Written last, so that whoever finds it finds the rest.
+        provenance.write_json(folder / PROVENANCE, provenance.collect())
+        provenance.write_json(folder / CONFIG, config)
+    check(folder, config)
+
+
+def row(split: splits.Split, index: int, episode: Episode) -> dict[str, Any]:
+    """An episode's row of the table of episodes."""
+    return {
+        "split": split.name,
+        "digest": split.digest,
+        "row": index,
+        **asdict(episode.setting),
+        "score": episode.score,
+        "success": episode.success,
+        "length": len(episode.actions),
+        "terminated": episode.terminated,
+        "truncated": episode.truncated,
+        "failure": episode.failure,
+    }
+
+
+def stored(folder: Path, wanted: Sequence[splits.Split]) -> pd.DataFrame:
+    """Episodes already in the folder, less those of splits that have changed since; raises DamagedRun."""
+    file = folder / EPISODES
+    if not file.exists():
+        return pd.DataFrame()
+    try:
+        episodes = pd.read_parquet(file)
+        now = episodes["split"].map({split.name: split.digest for split in wanted})
+        return episodes[now.isna() | (now == episodes["digest"])]
+    except (OSError, ValueError, KeyError) as error:
+        raise DamagedRun(file, error) from error
+
+
+def store(folder: Path, episodes: pd.DataFrame) -> None:
+    """Puts all episodes of a run in place of those that were there."""
+    provenance.write_whole(folder / EPISODES, lambda part: episodes.to_parquet(part))
+
+
+def unrecorded(folder: Path, done: pd.DataFrame, record: int) -> bool:
+    """Whether a recording is missing; an episode that failed before its first step has none."""
+    wanted = done[(done["row"] < record) & (done["length"] > 0)]
+    places = (_recording(folder, split, row) for split, row in zip(wanted["split"], wanted["row"], strict=True))
+    return not all(place.exists() for place in places)
+
+
+def record(
+    folder: Path, source: setting.Source, split: splits.Split, index: int, episode: Episode, about: dict[str, Any]
+) -> None:
+    """Writes an episode's recording, with whose it is in `about`."""
+    from dextron_bench import recording
+
+    properties = {**about, "split": split.name, "split_digest": split.digest, "row": index}
+    properties["physics"] = model.mjcf_hash()
+    recording.write(_recording(folder, split.name, index), episode, source.path(episode.setting), properties)
+
+
+def conclude(folder: Path, episodes: pd.DataFrame, about: dict[str, Any]) -> None:
+    """Writes the result: every episode's score, from which each row of the leaderboard is computed."""
+    scores = {
+        name: {
+            "digest": rows["digest"].iloc[0],
+            "scores": rows["score"].tolist(),
+            "failed": int((rows["failure"] != "").sum()),
+        }
+        for name, rows in episodes.groupby("split", sort=False)
+    }
+    provenance.write_json(folder / RESULT, {**about, "splits": scores, "provenance": read_json(folder / PROVENANCE)})
+
+
+def results(folder: Path) -> Iterator[dict[str, Any]]:
+    """Every result below a folder of runs; raises DamagedRun."""
+    for file in sorted(folder.glob(f"*/*/seed*/{RESULT}")):
+        yield read_result(file)
+
+
+def read_result(file: Path) -> dict[str, Any]:
+    """The content of a `result.json`; raises DamagedRun."""
+    found = read_json(file)
+    try:
+        parts = [found["method"], found["reaches"], found["seed"]]
+        parts += [(each["digest"][:8], sum(each["scores"]), each["failed"]) for each in found["splits"].values()]
+    except (KeyError, TypeError, AttributeError) as error:
+        raise DamagedRun(file, f"no result: {type(error).__name__} {error}") from error
+    return found
+
+
+def read_json(file: Path) -> dict[str, Any]:
+    """A JSON object from a file; raises DamagedRun."""
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise DamagedRun(file, error) from error
+    if not isinstance(found, dict):
+        raise DamagedRun(file, "it holds no JSON object")
+    return found
+
+
+def _recording(folder: Path, split: str, index: int) -> Path:
+    return folder / "recordings" / f"{split}-{index:04d}.rrd"

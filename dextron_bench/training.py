@@ -1,0 +1,194 @@
+"""Training: epochs, checkpoints and the learning curve of a learner, for all seeds together.
+
+Killed at any moment, the same call goes on from the last checkpoint and ends with the same bytes, but for
+`timing.jsonl`, which says how long epochs took.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from dextron_bench import methods, provenance, records
+from dextron_bench.checkpoints import Checkpoints
+from dextron_bench.curve import Curve
+from dextron_bench.learning import Learner, Track, Trainer
+from dextron_bench.rollout import AgentError, blaming
+from dextron_bench.splits import Split
+from dextron_bench.world import model
+
+TIMING = "timing.jsonl"
+RECENT = 50  # Epochs whose time tells that of the next.
+
+Report = Callable[[int, int, str], None]  # Told (epochs done, epochs in all, how it goes).
+
+
+class Diverged(ArithmeticError):
+    """A training whose numbers are no longer finite."""
+
+
+def quiet(done: int, total: int, note: str) -> None:
+    """Reports nothing."""
+
+
+def folder_of(base: Path, seeds: Sequence[int]) -> Path:
+    """Where seeds train together, below the folder of a method's runs on a source of reaches."""
+    return base / f"training-{'+'.join(map(str, seeds))}"
+
+
+def group_of(folder: Path) -> tuple[int, ...]:
+    """The seeds that train in a folder that `folder_of` named."""
+    return tuple(map(int, folder.name.removeprefix("training-").split("+")))
+
+
+def train(
+    learner: Learner, track: Track, seeds: Sequence[int], folder: Path, val: Split, report: Report = quiet
+) -> Checkpoints:
+    """Trains, or goes on training, until all epochs are done and the best snapshot of each seed is known.
+
+    Raises Diverged, AgentError, Busy, RunMismatch, DamagedRun.
+    """
+    done = Checkpoints(folder, seeds)
+    curve = Curve(learner, done, track.source, val, track.threads)
+    with done.locked():
+        records.claim(folder, config(learner, track, seeds))
+        found = done.progress()
+        if not found or not found.over:
+            _Lesson(learner, track, done, curve, report).finish()
+        done.finish()
+        curve.extend()
+        for seed in seeds:
+            curve.best(seed)
+    return done
+
+
+def config(learner: Learner, track: Track, seeds: Sequence[int]) -> dict[str, Any]:
+    """What a training depends on; another is not its continuation."""
+    return {
+        "method": learner.name,
+        "code": methods.origin_of(type(learner)),
+        "settings": methods.settings(learner),
+        "seeds": list(seeds),
+        "cases": provenance.digest(repr(list(track.cases)).encode()),
+        "physics": model.mjcf_hash(),
+    }
+
+
+def seconds_left(folder: Path, epochs: int, period: int) -> float | None:
+    """About how long so many more epochs take [s], from those before; None where there are none."""
+    rows = _timings(folder / TIMING)
+    trained = [row["seconds"] for row in rows if row["what"] == "epoch"][-RECENT:]
+    scored = [row["seconds"] for row in rows if row["what"] == "evaluation"][-RECENT:]
+    if not trained:
+        return None
+    return epochs * median(trained) + math.ceil(epochs / period) * (median(scored) if scored else 0.0)
+
+
+def measure(learner: Learner, track: Track, seeds: Sequence[int]) -> tuple[int, float]:
+    """The number of epochs of a training, and how long its first takes [s]; writes no files of a run."""
+    trainer = _begin(learner, track, seeds)
+    began = time.perf_counter()
+    with blaming(f"epoch 1 of method {learner.label!r}"):
+        trainer.advance()
+    return trainer.epochs, time.perf_counter() - began
+
+
+class _Lesson:
+    """What is left of a training."""
+
+    def __init__(self, learner: Learner, track: Track, done: Checkpoints, curve: Curve, report: Report) -> None:
+        self._learner, self._track, self._done, self._curve, self._report = learner, track, done, curve, report
+
+    def finish(self) -> None:
+        """Does all epochs that are not done."""
+        trainer = _begin(self._learner, self._track, self._done.seeds)
+        self._done.resume(trainer, self._track.device)
+        note = self._note()
+        self._report(trainer.epoch, trainer.epochs, note)
+        period = self._learner.period
+        while trainer.epoch < trainer.epochs:
+            last = min((trainer.epoch // period + 1) * period, trainer.epochs)
+            rows: list[dict[str, Any]] = []
+            while trainer.epoch < last:
+                rows += self._epoch(trainer)
+                self._report(trainer.epoch, trainer.epochs, note)
+            self._done.save(trainer, self._track.device, rows, self._about())
+            began = time.perf_counter()
+            note = self._note()
+            self._time("evaluation", trainer.epoch, time.perf_counter() - began)
+            self._report(trainer.epoch, trainer.epochs, note)
+
+    def _epoch(self, trainer: Trainer) -> list[dict[str, Any]]:
+        """One epoch's metrics, a row for each seed."""
+        number, began = trainer.epoch + 1, time.perf_counter()
+        with blaming(f"epoch {number} of method {self._learner.label!r}"):
+            noted = trainer.advance()
+        if trainer.epoch != number or len(noted) != len(self._done.seeds):
+            raise AgentError(
+                f"advance() of method {self._learner.label!r} must do one epoch and return a dictionary for each of "
+                f"{len(self._done.seeds)} seeds; it went from epoch {number - 1} to {trainer.epoch} with {len(noted)}"
+            )
+        self._time("epoch", number, time.perf_counter() - began)
+        rows = [
+            {"epoch": number, "seed": seed, **{name: float(value) for name, value in each.items()}}
+            for seed, each in zip(self._done.seeds, noted, strict=True)
+        ]
+        for row in rows:
+            if lost := [name for name, value in row.items() if not math.isfinite(value)]:
+                raise Diverged(self._farewell(row, lost[0]))
+        return rows
+
+    def _farewell(self, row: dict[str, Any], name: str) -> str:
+        found = self._done.progress()
+        last = f"the last good checkpoint is that of epoch {found.epoch}" if found else "there is no checkpoint yet"
+        return (
+            f"training of {self._learner.label!r} diverged: {name!r} of seed {row['seed']} is {row[name]} in epoch "
+            f"{row['epoch']}; {last} in {self._done.folder}"
+        )
+
+    def _note(self) -> str:
+        """Extends the learning curve; its last point in words."""
+        last = self._curve.extend()
+        return "val " + " ".join(f"{value:.1f}" for value in last.values()) if last else ""
+
+    def _about(self) -> dict[str, Any]:
+        """What goes with weights."""
+        learner = self._learner
+        return {
+            "method": learner.name,
+            "label": learner.label,
+            "settings": methods.settings(learner),
+            "physics": model.mjcf_hash(),
+        }
+
+    def _time(self, what: str, epoch: int, seconds: float) -> None:
+        with (self._done.folder / TIMING).open("a", encoding="utf-8") as file:
+            row = {"what": what, "epoch": epoch, "seconds": round(seconds, 4), "device": self._track.device}
+            file.write(json.dumps(row) + "\n")
+
+
+def _begin(learner: Learner, track: Track, seeds: Sequence[int]) -> Trainer:
+    with blaming(f"trainer() of method {learner.label!r}"):
+        trainer = learner.trainer(track, seeds)
+    if trainer.epochs < 1 or learner.period < 1:
+        raise AgentError(
+            f"method {learner.label!r} needs at least one epoch and a period of at least one; "
+            f"it has {trainer.epochs} and {learner.period}"
+        )
+    return trainer
+
+
+def _timings(file: Path) -> list[dict[str, Any]]:
+    """The rows of a file of timings; lines that were cut off are left out."""
+    rows = []
+    for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
+        try:
+            rows.append(json.loads(line))
+        except ValueError:
+            continue
+    return rows

@@ -1,0 +1,84 @@
+"""Weights of trained methods: the file of a run, those that ship beside a method's code, and a user's own."""
+
+from __future__ import annotations
+
+import inspect
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dextron_bench import provenance, tensors
+from dextron_bench.learning import Learner
+from dextron_bench.records import RunMismatch
+from dextron_bench.rollout import Agent, AgentError, blaming
+from dextron_bench.world import model
+
+FILE = "weights.safetensors"  # In a run's folder.
+TOLD = ("label", "reaches", "seeds", "epochs", "best_epoch", "frames")  # What a result says of its weights.
+
+
+class MissingWeights(LookupError):
+    """Weights that do not ship."""
+
+
+class BadWeights(ValueError):
+    """A file of weights that does not fit its method."""
+
+
+def shipped(learner: Learner, reaches: str) -> dict[int, Path]:
+    """The weights that ship for a method on a source of reaches, by seed, in order."""
+    place = Path(inspect.getfile(type(learner))).parent / "weights" / learner.label / reaches
+    found = {file.stem.removeprefix("seed"): file for file in place.glob("seed*.safetensors")}
+    return {int(seed): found[seed] for seed in sorted(found, key=lambda s: (len(s), s)) if seed.isdigit()}
+
+
+def about(file: Path) -> dict[str, Any]:
+    """What a file's weights come from, and the SHA-256 of the file; raises BadTensors, OSError."""
+    found = tensors.read_about(file)
+    return {**{name: found[name] for name in TOLD if name in found}, "sha256": tensors.sha256(file)}
+
+
+def seed(file: Path) -> int:
+    """The seed of a file's weights, 0 where it does not say; raises BadTensors, OSError."""
+    found = tensors.read_about(file).get("seed")
+    return found if type(found) is int and found >= 0 else 0
+
+
+def agent(learner: Learner, file: Path) -> Agent:
+    """The agent of a file's weights; raises BadWeights, BadTensors, OSError."""
+    arrays = tensors.read(file)
+    found = tensors.read_about(file).get("label", learner.label)
+    if found != learner.label:
+        raise BadWeights(f"{file} holds weights of {found!r}, not of {learner.label!r}")
+    if bad := [name for name, array in arrays.items() if not np.isfinite(array).all()]:
+        raise BadWeights(f"{file} holds numbers in {bad[0]!r} that are not finite")
+    try:
+        with blaming("policy()"):
+            made = learner.policy(arrays)
+            made.reset(np.arange(1))
+            shape = np.shape(made.act(np.tile(_still(), (1, 1))))
+    except AgentError as error:
+        cause = error.__cause__
+        raise BadWeights(
+            f"{file} holds no weights that fit {learner.label!r} ({type(cause).__name__}: {cause})"
+        ) from error
+    if shape != (1, 1):
+        raise BadWeights(f"{file} holds no weights that fit {learner.label!r}: actions of shape {shape} for one state")
+    return learner.policy(arrays)
+
+
+def adopt(file: Path, folder: Path) -> Path:
+    """Copies weights into a run's folder, or checks that they are those there; raises RunMismatch."""
+    place = folder / FILE
+    if not place.exists():
+        provenance.write_whole(place, lambda part: shutil.copyfile(file, part))
+    if tensors.sha256(place) != tensors.sha256(file):
+        raise RunMismatch(f"{folder} holds a run with other weights; remove it, or choose another folder with --runs")
+    return place
+
+
+def _still() -> np.ndarray:
+    """A state (48,) at rest."""
+    return np.concatenate([model.half_closed(), np.zeros(model.STATE - len(model.half_closed()))])

@@ -1,0 +1,100 @@
+"""How fast agents learn: stacked updates against Stable-Baselines3, the whole cycle, and what a checkpoint costs."""
+
+from __future__ import annotations
+
+import resource
+from functools import cache
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from measure import Row, alone, clocked, in_turns, note, scaled
+from pytest_benchmark.fixture import BenchmarkFixture
+from safetensors.numpy import save_file
+from workload import cases, reaches
+
+from baselines.cycle import FRAMES, Cycle
+from baselines.sac import BATCH, Batch, Sac
+from baselines.schedule import Schedule
+from dextron_bench.learning import Track
+
+ROUNDS = 5
+FILLED = 1000  # Transitions in the peer's buffer.
+
+
+class Idle(gymnasium.Env):
+    """A world of the right shape in which nothing happens."""
+
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (48,), np.float32)
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+        """A state drawn anew."""
+        super().reset(seed=seed)
+        return self.np_random.normal(size=48).astype(np.float32), {}
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """Another."""
+        return self.np_random.normal(size=48).astype(np.float32), 0.1, False, False, {}
+
+
+@cache
+def peer():
+    """Stable-Baselines3's SAC with the same sizes and a filled buffer."""
+    sb3 = pytest.importorskip("stable_baselines3")
+    sizes = {"net_arch": [256, 256]}
+    made = sb3.SAC("MlpPolicy", Idle(), batch_size=BATCH, learning_starts=FILLED, policy_kwargs=sizes, device="cpu")
+    made.learn(FILLED)
+    return made
+
+
+def batches(agents: int, count: int) -> list[tuple[Batch, torch.Tensor]]:
+    rng = np.random.default_rng(0)
+
+    def normal(width: int) -> torch.Tensor:
+        return torch.tensor(rng.normal(size=(agents, BATCH, width)), dtype=torch.float32)
+
+    alive = torch.ones(agents, BATCH, 1)
+    return [(Batch(normal(48), normal(1).tanh(), normal(1), normal(48), alive), normal(1)) for _ in range(count)]
+
+
+@pytest.mark.parametrize(("agents", "aim"), [(1, None), (3, 5.0), (12, 7.0)])
+def test_updates(benchmark: BenchmarkFixture, agents: int, aim: float | None) -> None:
+    learner, count = Sac([np.random.default_rng(k) for k in range(agents)]), scaled(200)
+    given, other = batches(agents, 8), peer()
+
+    def mine() -> None:
+        for k in range(count):
+            learner.update(*given[k % len(given)])
+
+    seconds, others = in_turns(benchmark, mine, lambda: other.train(count, BATCH), ROUNDS)
+    what = f"Updates of SAC, each of {agents} agents stacked"
+    against = "an update of Stable-Baselines3's SAC (two critics, where the paper has Q and V)"
+    note(benchmark, Row(what, "updates/s", count * agents / seconds, against, count / others, aim))
+
+
+@pytest.mark.parametrize("agents", [1, 3])
+def test_cycles(benchmark: BenchmarkFixture, agents: int, tmp_path: Path) -> None:
+    track = Track(reaches(), cases(24), tmp_path)
+    trainer = Cycle(track, range(agents), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
+    trainer.advance()
+    trainer.journal()
+    rounds = max(1, round(3 * min(1.0, scaled(100) / 100)))
+    seconds = alone(benchmark, trainer.advance, rounds)
+    frames = FRAMES / seconds
+    hours = 1000 * seconds / 3600
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    journal, state = trainer.journal(), trainer.state()
+    size = sum(array.nbytes for array in state.values()) / 1e6
+    grown = sum(array.nbytes for array in journal.values()) / 1e6 / rounds
+    written = clocked(lambda: save_file(state, tmp_path / "checkpoint.safetensors"))
+    note(
+        benchmark,
+        Row(f"Cycles of RLIL 0.1, {agents} seeds together (1,000 epochs: {hours:.2g} h)", "frames/s", frames),
+        Row(
+            f"Checkpoint of {agents} seeds: {size:.0f} MB, and {grown:.2g} MB an epoch of experience", "/s", 1 / written
+        ),
+        Row(f"Memory of the whole process after a few epochs of {agents} seeds", "MB", memory),
+    )

@@ -1,0 +1,185 @@
+"""Diagnosis: every cause from states made by hand, and what experts with a wrong d_c are told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dextron_bench import diagnosis
+from dextron_bench.diagnosis import closing, diagnose, expert_closing, touch
+from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench.rollout import Case, Episode, rollout
+from dextron_bench.world import model, task
+from dextron_bench.world.minjerk import MinjerkSource
+from dextron_bench.world.reach import PALM_CENTRE
+from dextron_bench.world.setting import Setting
+
+SETTING = Setting("made-up", 0.0, 0.0, 0.0)
+CASE = Case(SETTING, Expert(1.2, 0.251), 0.1)  # Closes from 0.1 m on, in state 30 of APPROACH.
+STEPS = 40
+APPROACH = np.linspace(0.4, 0.0, STEPS + 1)  # [m] 0.01 m a step.
+STANDS = np.full(STEPS + 1, 0.125)  # [m]
+OPEN_FIRST = np.maximum(0.5 - 0.02 * np.arange(STEPS + 1), 0.2)
+
+
+def states(
+    distances: np.ndarray = APPROACH,
+    closures: np.ndarray = OPEN_FIRST,
+    heights: np.ndarray = STANDS,
+    touched: int | None = 35,
+) -> np.ndarray:
+    """States (41, 48) with such distances, closures and bottle heights; the bottle is pushed in state `touched`."""
+    made = np.zeros((STEPS + 1, model.STATE))
+    made[:, 2] = heights
+    if touched is not None:
+        made[touched:, 1] = 0.003
+    made[:, model.PALM_POSITION] = -PALM_CENTRE
+    made[:, 7] -= np.sqrt(np.maximum(distances**2 - made[:, 1] ** 2, 0.0))
+    made[:, model.PALM_QUATERNION] = made[:, model.BOTTLE_QUATERNION] = [1.0, 0.0, 0.0, 0.0]
+    joints, closed = model.proximal()
+    made[:, joints] = closures[:, None] * closed
+    return made
+
+
+def closing_from(start: int, rate: float = 0.03) -> np.ndarray:
+    """Closures that fall to 0.2 and rise by `rate` a step after state `start`."""
+    return OPEN_FIRST + rate * np.maximum(np.arange(STEPS + 1) - start, 0)
+
+
+def episode(made: np.ndarray, score: int = 0, fell: bool = False, failure: str = "") -> Episode:
+    rewards = np.zeros(STEPS)
+    rewards[:score] = 1.0
+    return Episode(SETTING, made, np.zeros((STEPS, 1)), rewards, fell, not fell, failure)
+
+
+def cause(made: np.ndarray, score: int = 0, fell: bool = False, failure: str = "") -> str:
+    return diagnose(episode(made, score, fell, failure), CASE).cause
+
+
+def test_the_states_made_here_are_what_they_say():
+    made = states(touched=None)
+    np.testing.assert_allclose(task.distance(made), APPROACH, atol=1e-12)
+    np.testing.assert_allclose(task.closure(made), OPEN_FIRST, atol=1e-12)
+
+
+def test_a_hand_closes_where_its_largest_rise_begins():
+    assert closing(closing_from(28)) == 28
+    assert closing(OPEN_FIRST) is None
+    assert closing(np.array([0.5, 0.57, 0.5, 0.5])) is None  # Rises by 0.07.
+    assert closing(np.array([0.5, 0.3, 0.31, 0.33, 0.5, 0.2, 0.3])) == 2  # The rise of 0.2, once past 0.32.
+
+
+def lag(closures: np.ndarray, critical: float = 0.251, distances: np.ndarray = APPROACH) -> float:
+    case = replace(CASE, expert=Expert(1.2, critical))
+    return diagnose(episode(states(distances, closures)), case).closing_lag
+
+
+def test_the_lag_counts_from_the_state_in_which_the_expert_would_close():
+    assert lag(closing_from(33)) == pytest.approx(0.06)
+    assert lag(closing_from(20)) == pytest.approx(-0.20)
+    assert np.isnan(lag(OPEN_FIRST))
+
+
+def test_every_expert_closes_within_3_cm():
+    assert lag(closing_from(30), critical=0.0) == pytest.approx(-8 * 0.02)  # 0.02 m is reached in state 38.
+
+
+def test_the_end_stands_in_for_an_expert_that_never_closed():
+    assert expert_closing(np.maximum(APPROACH, 0.2), 0.251) is None
+    assert lag(closing_from(25), distances=np.maximum(APPROACH, 0.2)) == pytest.approx(-15 * 0.02)
+
+
+def test_the_first_state_is_only_measured_by():
+    assert expert_closing(APPROACH, 1.1) == 1
+
+
+def test_touch():
+    assert touch(states(touched=35)) == 35
+    assert touch(states(touched=None)) is None
+
+
+def test_solved_and_failed():
+    assert cause(states(), score=20) == "solved"
+    assert cause(states(), score=20, failure="action is nan at step 40") == "agent failed"
+
+
+def test_an_agent_that_fails_at_once_is_diagnosed():
+    none = Episode(SETTING, states()[:1], np.zeros((0, 1)), np.zeros(0), False, False, "action is nan at step 0")
+    found = diagnose(none, CASE)
+    assert found.cause == "agent failed"
+    assert np.isnan(found.closing_lag)
+
+
+@pytest.mark.parametrize(
+    ("start", "fell", "expected"),
+    [
+        (29, True, "too early"),
+        (29, False, "too early"),
+        (31, True, "knocked over"),
+        (31, False, "slipped"),
+        (36, True, "knocked over"),  # 6 steps late, as experts can be.
+        (37, True, "too late"),
+        (37, False, "too late"),
+    ],
+)
+def test_the_moment_of_closing_decides(start: int, fell: bool, expected: str):
+    assert cause(states(closures=closing_from(start, 0.1)), fell=fell) == expected
+
+
+def test_a_bottle_hit_by_a_hand_that_was_never_opened_is_knocked_over():
+    half_closed = np.full(STEPS + 1, 0.5)
+    assert cause(states(closures=half_closed), fell=True) == "knocked over"
+    assert cause(states(closures=OPEN_FIRST), fell=True) == "too late"
+    assert cause(states(closures=half_closed)) == "too late"
+
+
+def test_a_bottle_that_fell_before_the_experts_moment_is_knocked_over():
+    assert cause(states(np.maximum(APPROACH, 0.11)), fell=True) == "knocked over"
+    assert cause(states(np.maximum(APPROACH, 0.09)), fell=True) == "too late"
+
+
+def test_what_was_gripped_slipped_or_came_up_too_late():
+    up = STANDS + 0.01 * np.maximum(np.arange(STEPS + 1) - 25, 0)  # To 0.275 m.
+    down = np.where(np.arange(STEPS + 1) < 38, up, 0.2)
+    assert cause(states(heights=up, closures=closing_from(31)), score=8) == "too late"
+    assert cause(states(heights=up, closures=closing_from(20)), score=8) == "too early"
+    for start in (20, 31):
+        assert cause(states(heights=down, closures=closing_from(start)), score=8) == "slipped"
+        assert cause(states(heights=down, closures=closing_from(start)), score=8, fell=True) == "slipped"
+
+
+def test_never_reached_needs_a_bottle_that_was_left_alone():
+    aside = np.maximum(APPROACH, 0.061)
+    assert cause(states(aside, touched=None)) == "never reached"
+    assert cause(states(aside, touched=35)) == "too late"
+    assert cause(states(np.maximum(APPROACH, 0.059), touched=None)) == "too late"
+
+
+def test_a_table_counts_each_method_by_cause():
+    rows = pd.DataFrame(
+        [("exp", "solved"), ("exp", "solved"), ("bc", "slipped"), ("bc", "solved")], columns=["method", "cause"]
+    )
+    found = diagnosis.table(rows)
+    assert found.columns.tolist() == list(diagnosis.CAUSES)
+    assert found.index.tolist() == ["bc", "exp"]
+    assert found.to_numpy().tolist() == [[1, 0, 0, 0, 1, 0, 0], [2, 0, 0, 0, 0, 0, 0]]
+
+
+def test_experts_that_close_too_early_or_late_are_told_so():
+    source = MinjerkSource()
+    right = Case(Setting("minjerk-000007", 0.0, 0.0, 0.0), Expert(2.0, 0.15), 0.1)
+    played = {
+        critical: next(
+            rollout(ExpertAgent(), source, [replace(right, expert=Expert(2.0, critical))], slots=1, threads=1)
+        )[1]
+        for critical in (0.15, 0.9)
+    }
+    found = diagnose(played[0.15], right)
+    assert found.cause == "solved"
+    assert found.closing_lag == pytest.approx(0.04, abs=0.03)
+    early = diagnose(played[0.9], right)
+    assert early.cause == "too early"
+    assert early.closing_lag < -0.5
