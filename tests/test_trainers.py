@@ -72,7 +72,7 @@ def test_a_seed_learns_beside_others_what_it_learns_alone(kind: str, tmp_path: P
     """
     schedule = Schedule(epochs=4, warm_start=150, period=1)
     together, alone = trainer(kind, tmp_path, (0, 1), schedule), trainer(kind, tmp_path, (1,), schedule)
-    together.advance(), alone.advance()
+    _ = together.advance(), alone.advance()
     (other, found), (wanted,) = together.advance(), alone.advance()
     assert found == pytest.approx(wanted, rel=1e-2)
     assert other != pytest.approx(wanted, rel=1e-2)
