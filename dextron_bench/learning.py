@@ -44,7 +44,10 @@ class Trainer(Protocol):
     epoch: int  # How many are done.
 
     def advance(self) -> list[dict[str, float]]:
-        """Trains for one epoch; returns what to note of it, for each seed."""
+        """Trains for one epoch; returns what to note of it, for each seed: finite numbers, what is unknown left out.
+
+        `frames` is the number of control steps that the agent has lived through so far.
+        """
         ...
 
     def weights(self) -> list[Arrays]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench import methods, provenance, splits
+from dextron_bench import diagnosis, methods, provenance, splits
 from dextron_bench.rollout import Episode
 from dextron_bench.world import model, setting
 
@@ -65,6 +65,7 @@ def claim(folder: Path, config: dict[str, Any]) -> None:
 
 def row(split: splits.Split, index: int, episode: Episode) -> dict[str, Any]:
     """An episode's row of the table of episodes."""
+    found = diagnosis.diagnose(episode, split.cases[index])
     return {
         "split": split.name,
         "digest": split.digest,
@@ -76,6 +77,8 @@ def row(split: splits.Split, index: int, episode: Episode) -> dict[str, Any]:
         "terminated": episode.terminated,
         "truncated": episode.truncated,
         "failure": episode.failure,
+        "cause": found.cause,
+        "closing_lag": found.closing_lag,
     }
 
 

@@ -115,6 +115,8 @@ def test_the_result_is_what_the_episodes_say(tmp_path: Path):
         rows = episodes[episodes["split"] == name]
         assert rows["row"].tolist() == list(range(len(rows)))
         assert found["scores"] == rows["score"].tolist() == [20.0] * len(rows)
+        assert set(rows["cause"]) == {"solved"}
+        assert rows["closing_lag"].between(0.0, 0.12).all()
         assert found["digest"] == splits.load("synthetic", name).digest
         assert found["failed"] == 0
     assert episodes["success"].all()
