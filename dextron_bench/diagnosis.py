@@ -40,7 +40,7 @@ CAUSES = ("solved", "too early", "too late", "knocked over", "slipped", "never r
 CLOSED = 0.08  # Rise of closure; the least in an early grasp that failed was 0.086.
 STILL = 0.02
 IN_TIME = 6 * model.CONTROL_STEP  # [s] the latest that an expert is itself found to close.
-RAISED = 0.15  # [m] height of the bottle's centre; untouched by a grip it never came above 0.131.
+RAISED = 0.15  # [m] height of the bottle's centre; in no grip it never came above 0.130.
 DROP = 0.02  # [m]
 TOUCH = 0.002  # [m]
 REACHED = 0.06  # [m] experts that succeed come within 0.055.
@@ -51,7 +51,7 @@ FIST = 0.4  # Closure; 99 % of experts that succeed touch the bottle with less.
 class Diagnosis:
     """One of CAUSES, and when the hand closed after the expert would have [s], NaN where it never closed.
 
-    The lag is good to IN_TIME: experts themselves have 0.02 to 0.12 s, mostly 0.04.
+    The lag is good to IN_TIME: experts themselves have 0 to 0.12 s, mostly 0.04.
     """
 
     cause: str
