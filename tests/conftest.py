@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes would otherwise take every core.
+
 BESIDE = Path(__file__).parents[2] / "shared" / "data" / "dextron-a101b9e-extracts.zip"
 NAMES = ("01_fl_01", "01_fl_06", "02_nr_16")
 START = 3.5  # [s] first sample on the recorder's clock.
