@@ -15,7 +15,7 @@ from baselines import demonstrations, policy, snapshot
 from baselines.networks import Stack
 from baselines.normalise import CLIP, EPSILON
 from baselines.policy import MeanAgent
-from baselines.schedule import SCHEDULES, Preset, suffix
+from baselines.schedule import SCHEDULES, Scheduled
 
 BATCH = 512  # Table II.
 LEARNING_RATE = 1e-3
@@ -29,24 +29,10 @@ def imitation_loss(mean: Tensor, actions: Tensor) -> Tensor:
 
 
 @dataclass(frozen=True)
-class Bc:
+class Bc(Scheduled):
     """Behaviour cloning of the experts (paper, fig. 4a, "BC")."""
 
     name: ClassVar[str] = "bc"
-    home: ClassVar[str] = ""
-
-    preset: Preset = "paper"
-    """How long to train: an hour (paper), minutes (quick), seconds (smoke)."""
-
-    @property
-    def label(self) -> str:
-        """The method's name, and its preset where that is not the paper's."""
-        return self.name + suffix(self.preset)
-
-    @property
-    def period(self) -> int:
-        """Epochs between checkpoints."""
-        return SCHEDULES[self.preset].period
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """One network a seed, side by side."""

@@ -11,28 +11,14 @@ from dextron_bench.learning import Track, Trainer
 
 from baselines.cycle import Cycle
 from baselines.policy import MeanAgent
-from baselines.schedule import SCHEDULES, Preset, suffix
+from baselines.schedule import SCHEDULES, Scheduled
 
 
 @dataclass(frozen=True)
-class Rl:
+class Rl(Scheduled):
     """SAC that learns from its own episodes alone (paper, fig. 4a, "RL")."""
 
     name: ClassVar[str] = "rl"
-    home: ClassVar[str] = ""
-
-    preset: Preset = "paper"
-    """How long to train: hours (paper), minutes (quick), seconds (smoke)."""
-
-    @property
-    def label(self) -> str:
-        """The method's name, and its preset where that is not the paper's."""
-        return self.name + suffix(self.preset)
-
-    @property
-    def period(self) -> int:
-        """Epochs between checkpoints."""
-        return SCHEDULES[self.preset].period
 
     @property
     def demonstrated(self) -> int:

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 from baselines.rl import Rl
 from baselines.sac import BATCH
-from baselines.schedule import suffix
 
 
 class BadShare(ValueError):
@@ -28,9 +27,9 @@ class Rlil(Rl):
             raise BadShare(f"--dur is {self.dur:g}; a demo-use ratio lies between 0 and 1")
 
     @property
-    def label(self) -> str:
-        """Tells demo-use ratios and presets apart, as "rlil-0.1" does."""
-        return f"{self.name}-{self.dur:g}{suffix(self.preset)}"
+    def stem(self) -> str:
+        """Tells demo-use ratios apart, as "rlil-0.1" does."""
+        return f"{self.name}-{self.dur:g}"
 
     @property
     def demonstrated(self) -> int:

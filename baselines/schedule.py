@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 Preset = Literal["paper", "quick", "smoke"]
 
@@ -28,6 +28,27 @@ SCHEDULES: dict[str, Schedule] = {
 }
 
 
-def suffix(preset: Preset) -> str:
-    """What a preset adds to a method's label; the paper's adds nothing."""
-    return "" if preset == "paper" else f"-{preset}"
+@dataclass(frozen=True)
+class Scheduled:
+    """What the baselines that learn have in common: a preset, which names the run and sets its schedule."""
+
+    name: ClassVar[str]
+    home: ClassVar[str] = ""
+
+    preset: Preset = "paper"
+    """How long to train: hours (paper), minutes (quick), seconds (smoke)."""
+
+    @property
+    def label(self) -> str:
+        """The method's name with its settings, and its preset where that is not the paper's."""
+        return self.stem + ("" if self.preset == "paper" else f"-{self.preset}")
+
+    @property
+    def stem(self) -> str:
+        """The label less the preset."""
+        return self.name
+
+    @property
+    def period(self) -> int:
+        """Epochs between checkpoints."""
+        return SCHEDULES[self.preset].period

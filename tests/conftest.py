@@ -6,10 +6,13 @@ import hashlib
 import json
 import os
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from dextron_bench import cli
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes would otherwise take every core.
 
@@ -71,3 +74,21 @@ def published(tmp_path: Path) -> Published:
     hashes = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
     made.manifest.write_text(json.dumps({"files": hashes}))
     return made
+
+
+@pytest.fixture
+def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """The one line on stderr of a command that ends with code 2 and no result."""
+
+    def run(*words: str) -> str:
+        capsys.readouterr()
+        try:
+            code = cli.main(list(words))
+        except SystemExit as ended:
+            code = ended.code
+        printed = capsys.readouterr()
+        assert (code, printed.out, printed.err.count("\n")) == (2, "", 1)
+        assert printed.err.startswith("dextron-bench: ")
+        return printed.err
+
+    return run

@@ -45,22 +45,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     tiny.forget()
 
 
-@pytest.fixture
-def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
-    """The one line on stderr of a command that ends with code 2 and no result."""
-
-    def run(*words: str) -> str:
-        capsys.readouterr()
-        assert cli.main(list(words)) == 2
-        printed = capsys.readouterr()
-        assert printed.out == ""
-        assert printed.err.count("\n") == 1
-        assert printed.err.startswith("dextron-bench: ")
-        return printed.err
-
-    return run
-
-
 def mine(folder: Path, spoil: str) -> str:
     """A method whose agent sends zeros, spoiled by a statement."""
     (folder / "mine.py").write_text(AGENT.format(spoil=spoil))

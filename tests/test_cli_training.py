@@ -40,24 +40,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     tiny.forget()
 
 
-@pytest.fixture
-def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
-    """The one line on stderr of a command that ends with code 2 and no result."""
-
-    def run(*words: str) -> str:
-        capsys.readouterr()
-        try:
-            code = cli.main(list(words))
-        except SystemExit as ended:
-            code = ended.code
-        printed = capsys.readouterr()
-        assert (code, printed.out, printed.err.count("\n")) == (2, "", 1)
-        assert printed.err.startswith("dextron-bench: ")
-        return printed.err
-
-    return run
-
-
 def run(spec: str, *words: str) -> list[str]:
     return ["run", "--method", spec, *FAST, "--split", "test", "--preset", "smoke", *words]
 
