@@ -28,9 +28,9 @@ class Sizes:
     """Rows of the splits, how finely d_c is scanned, and how many reaches are tried at a time."""
 
     train: int = 600
-    val: int = 200
-    test: int = 500
-    scan: int = 16
+    val: int = 100
+    test: int = 200
+    scan: int = 8
     batch: int = 256
 
 
