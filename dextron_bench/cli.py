@@ -31,7 +31,10 @@ Group = tuple[str, dict[str, type[Verb]]]  # What a group of verbs is about, and
 VERBS: dict[str, type[Verb] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
-    "leaderboard": leaderboard.Leaderboard,
+    "leaderboard": (
+        "The leaderboard: show that of a folder of runs, build the published one.",
+        {"show": leaderboard.Show, "build": leaderboard.Build},
+    ),
     "view": view.View,
     "list": listing.List,
     "data": (

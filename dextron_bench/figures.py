@@ -72,6 +72,29 @@ def start_points(source: Source, rows: pd.DataFrame, file: Path) -> None:
     figure.savefig(file, dpi=200)
 
 
+def learning_curves(curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFrame, file: Path) -> None:
+    """Draws mean and range over seeds of the return on `val` against epochs of 1,000 frames (paper, Fig. 4a).
+
+    `curves` has a table for each method and seed, with columns `epoch` and `return`. Methods among the leaderboard's
+    `rows` that have none stand as a line at their return on `test`. Raises UnknownFormat, OSError.
+    """
+    _check(file)
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    axes = figure.add_subplot()
+    for place, (label, seeds) in enumerate(sorted(curves.items())):
+        table = pd.concat([points.set_index("epoch")["return"] for points in seeds.values()], axis=1)
+        mean, colour = table.mean(axis=1), f"C{place}"
+        axes.plot(table.index, mean, color=colour, label=f"{label} ({len(seeds)} seeds)", linewidth=1.5)
+        axes.fill_between(table.index, table.min(axis=1), table.max(axis=1), color=colour, alpha=0.15, linewidth=0)
+    for place, row in enumerate(rows[rows["split"] == "test"].to_dict("records")):
+        if row["method"] not in curves:
+            style = ("--", ":", "-.", (0, (1, 3)))[place % 4]
+            axes.axhline(row["return"], color="0.4", linewidth=1, linestyle=style, label=f"{row['method']} (on test)")
+    axes.set(xlabel="epochs of 1,000 frames", ylabel="sum of rewards", ylim=(0.0, 20.5), xlim=(0.0, None))
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+    figure.savefig(file, dpi=150)
+
+
 def _check(file: Path) -> None:
     if file.suffix.lower() not in FORMATS:
         raise UnknownFormat(file)

@@ -119,12 +119,14 @@ def record(
 
 
 def conclude(folder: Path, episodes: pd.DataFrame, about: dict[str, Any]) -> None:
-    """Writes the result: every episode's score, from which each row of the leaderboard is computed."""
+    """Writes the result: every episode's score, from which the leaderboard is computed, and how episodes end."""
     scores = {
         name: {
             "digest": rows["digest"].iloc[0],
             "scores": rows["score"].tolist(),
             "failed": int((rows["failure"] != "").sum()),
+            "causes": {cause: int(count) for cause, count in rows["cause"].value_counts(sort=False).items()},
+            "closing_lag": None if rows["closing_lag"].isna().all() else round(float(rows["closing_lag"].median()), 3),
         }
         for name, rows in episodes.groupby("split", sort=False)
     }
@@ -142,7 +144,8 @@ def read_result(file: Path) -> dict[str, Any]:
     found = read_json(file)
     try:
         parts = [found["method"], found["reaches"], found["seed"]]
-        parts += [(each["digest"][:8], sum(each["scores"]), each["failed"]) for each in found["splits"].values()]
+        for each in found["splits"].values():
+            parts += [each["digest"][:8], sum(each["scores"]), each["failed"], sum(each["causes"].values())]
     except (KeyError, TypeError, AttributeError) as error:
         raise DamagedRun(file, f"no result: {type(error).__name__} {error}") from error
     return found

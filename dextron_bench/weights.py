@@ -27,10 +27,15 @@ class BadWeights(ValueError):
     """A file of weights that does not fit its method."""
 
 
+def place(learner: Learner, reaches: str) -> Path:
+    """The folder of the weights that ship for a method on a source of reaches: beside its code."""
+    return Path(inspect.getfile(type(learner))).parent / "weights" / learner.label / reaches
+
+
 def shipped(learner: Learner, reaches: str) -> dict[int, Path]:
     """The weights that ship for a method on a source of reaches, by seed, in order."""
-    place = Path(inspect.getfile(type(learner))).parent / "weights" / learner.label / reaches
-    found = {file.stem.removeprefix("seed"): file for file in place.glob("seed*.safetensors")}
+    files = place(learner, reaches).glob("seed*.safetensors")
+    found = {file.stem.removeprefix("seed"): file for file in files}
     return {int(seed): found[seed] for seed in sorted(found, key=lambda s: (len(s), s)) if seed.isdigit()}
 
 
@@ -71,12 +76,12 @@ def agent(learner: Learner, file: Path) -> Agent:
 
 def adopt(file: Path, folder: Path) -> Path:
     """Copies weights into a run's folder, or checks that they are those there; raises RunMismatch."""
-    place = folder / FILE
-    if not place.exists():
-        provenance.write_whole(place, lambda part: shutil.copyfile(file, part))
-    if tensors.sha256(place) != tensors.sha256(file):
+    own = folder / FILE
+    if not own.exists():
+        provenance.write_whole(own, lambda part: shutil.copyfile(file, part))
+    if tensors.sha256(own) != tensors.sha256(file):
         raise RunMismatch(f"{folder} holds a run with other weights; remove it, or choose another folder with --runs")
-    return place
+    return own
 
 
 def _still() -> np.ndarray:

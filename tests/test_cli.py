@@ -62,7 +62,7 @@ def test_results_are_json_and_nothing_else(here: Path, capsys: pytest.CaptureFix
     assert (row["method"], row["reaches"], row["split"], row["episodes"]) == ("exp", "synthetic", "test", 2)
     assert (row["return"], row["success"], row["failed"]) == (20.0, 1.0, 0)
     assert printed.err == ""
-    assert cli.main(["leaderboard", "--json"]) == 0
+    assert cli.main(["leaderboard", "show", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == [row]
 
 
@@ -181,7 +181,7 @@ def test_a_damaged_run_is_one_line_that_names_the_file(
     assert cli.main(words) == 0
     file = here / "runs" / "nothing" / "synthetic" / "seed0" / name
     file.write_bytes(file.read_bytes()[:20])
-    line = complaint(*(["leaderboard"] if name == "result.json" else words))
+    line = complaint(*(["leaderboard", "show"] if name == "result.json" else words))
     assert f"runs/nothing/synthetic/seed0/{name} is damaged" in line
     assert "remove it and run again" in line
     file.unlink()
@@ -197,9 +197,9 @@ def test_a_damaged_split_is_one_line(here: Path, complaint: Callable[..., str]):
 
 
 def test_a_leaderboard_without_results_says_how_to_make_some(here: Path, capsys: pytest.CaptureFixture[str]):
-    assert cli.main(["leaderboard"]) == 0
+    assert cli.main(["leaderboard", "show"]) == 0
     assert "dextron-bench run" in capsys.readouterr().out
-    assert cli.main(["leaderboard", "--json"]) == 0
+    assert cli.main(["leaderboard", "show", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == []
 
 
@@ -257,7 +257,18 @@ def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
 
 
 @pytest.mark.parametrize(
-    "words", [["doctor"], ["list"], ["leaderboard"], ["view"], ["splits"], ["mc"], ["run"], ["eval"]]
+    "words",
+    [
+        ["doctor"],
+        ["list"],
+        ["leaderboard", "show"],
+        ["leaderboard", "build"],
+        ["view"],
+        ["splits"],
+        ["mc"],
+        ["run"],
+        ["eval"],
+    ],
 )
 def test_help_of_a_verb_has_an_example(words: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:

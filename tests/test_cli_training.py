@@ -198,7 +198,7 @@ def test_weights_of_a_file_give_the_row_of_its_run(here: Path, capsys: pytest.Ca
     file = here / "runs" / "toy-0.1" / "synthetic" / "seed4" / "weights.safetensors"
     assert rows(capsys, *evaluate("--weights", str(file))) == trained
     assert (here / "runs" / "eval" / "toy-0.1" / "synthetic" / "seed4" / "result.json").exists()
-    assert len(rows(capsys, "leaderboard")) == 1  # Evaluations of weights are not counted again.
+    assert len(rows(capsys, "leaderboard", "show")) == 1  # Evaluations of weights are not counted again.
 
 
 def test_weights_that_ship_lie_beside_the_method(

@@ -148,6 +148,7 @@ def test_a_missing_recording_is_made_and_one_that_cannot_be_is_not_missed(
     assert made == []  # An episode that failed before its first step.
     assert records.read_result(folder / "result.json")["splits"]["open"] == {
         "digest": splits.load("synthetic", "open").digest, "scores": [0.0], "failed": 1,
+        "causes": {"agent failed": 1}, "closing_lag": None,
     }  # fmt: skip
     monkeypatch.setattr(run, "rollout", forbid)
     play(tmp_path, plan)
@@ -216,12 +217,15 @@ RESULT = {
     "method": "a",
     "reaches": "real",
     "seed": 0,
-    "splits": {"test": {"digest": "d", "scores": [1.0], "failed": 0}},
+    "splits": {"test": {"digest": "d", "scores": [1.0], "failed": 0, "causes": {"slipped": 1}, "closing_lag": 0.04}},
 }
 
 
 NO_RESULTS = [{}, [], RESULT | {"splits": []}, RESULT | {"splits": {"test": {}}}]
-NO_RESULTS.append(RESULT | {"splits": {"test": {"digest": "d", "scores": ["a"], "failed": 0}}})
+NO_RESULTS.append(
+    RESULT
+    | {"splits": {"test": {"digest": "d", "scores": ["a"], "failed": 0, "causes": {"slipped": 1}, "closing_lag": 0.04}}}
+)
 
 
 @pytest.mark.parametrize("text", ["", "{", *map(json.dumps, NO_RESULTS)])

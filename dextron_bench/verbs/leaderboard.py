@@ -1,10 +1,10 @@
-"""`dextron-bench leaderboard`: the table, computed from episodes."""
+"""`dextron-bench leaderboard`: the rows of all runs in a folder, and the published ones."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dextron_bench.verbs.printing import print_json, print_table
 
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Leaderboard:
-    """Print the leaderboard of the runs in a folder, computed from their episodes' scores.
+class Show:
+    """Print the leaderboard of the runs in a folder, computed from their episodes' scores, and how episodes end.
 
-    Example: dextron-bench leaderboard --runs runs
+    Example: dextron-bench leaderboard show --runs leaderboard/results
     """
 
     runs: Path = Path("runs")
@@ -27,14 +27,38 @@ class Leaderboard:
     def __call__(self) -> int:
         from dextron_bench import leaderboard, records
 
-        print_rows(leaderboard.table(records.results(self.runs)), self.json)
+        rows = leaderboard.table(records.results(self.runs))
+        print_rows(rows, self.json)
+        if not self.json:
+            print_endings(rows)
+        return 0
+
+
+@dataclass(frozen=True)
+class Build:
+    """Make the published leaderboard's tables and pictures from its results, after those of finished runs are added.
+
+    Example: dextron-bench leaderboard build --runs runs --into leaderboard
+    """
+
+    runs: Path | None = None
+    """Folder of runs whose results, learning curves and weights are published; by default none is added."""
+    into: Path = Path("leaderboard")
+    """Folder of the leaderboard."""
+
+    def __call__(self) -> int:
+        from dextron_bench import publication
+
+        if self.runs is not None:
+            print(*publication.take(self.runs, self.into), sep="\n")
+        print(*publication.build(self.into), sep="\n")
         return 0
 
 
 def print_rows(rows: pd.DataFrame, as_json: bool) -> None:
     """The leaderboard's rows on stdout."""
     if as_json:
-        print_json(rows.to_dict("records"))
+        print_json([{name: none_for_nan(value) for name, value in row.items()} for row in rows.to_dict("records")])
         return
     if rows.empty:
         print("no results yet; `dextron-bench run --method exp` makes some")
@@ -54,3 +78,25 @@ def print_rows(rows: pd.DataFrame, as_json: bool) -> None:
         ]
         columns = ["method", "return [95 %]", "success % [95 %]", "seeds", "episodes", *(["failed"] if failed else [])]
         print_table(f"{reaches} reaches, split {split}, version {group['version'].iloc[0]}", columns, cells)
+
+
+def print_endings(rows: pd.DataFrame) -> None:
+    """How the episodes of the leaderboard's rows end [%], on stdout (docs/diagnosis.md)."""
+    from dextron_bench.diagnosis import CAUSES
+
+    for (reaches, split), group in rows.groupby(["reaches", "split"], sort=False):
+        cells = [
+            [
+                row["method"],
+                *(f"{100 * row[cause] / row['episodes']:.1f}" for cause in CAUSES),
+                "" if row["closing_lag"] != row["closing_lag"] else f"{row['closing_lag']:.2f}",
+            ]
+            for row in group.to_dict("records")
+        ]
+        title = f"how episodes end [%]: {reaches} reaches, split {split}"
+        print_table(title, ["method", *CAUSES, "closing lag [s]"], cells)
+
+
+def none_for_nan(value: Any) -> Any:
+    """A value that JSON has, where it has no NaN."""
+    return None if value != value else value

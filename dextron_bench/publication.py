@@ -1,0 +1,136 @@
+"""The published leaderboard: results, curves and weights taken over from runs, and what is made of them."""
+
+from __future__ import annotations
+
+import shutil
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from dextron_bench import leaderboard, methods, provenance, records, splits, weights
+from dextron_bench.diagnosis import CAUSES
+from dextron_bench.learning import Learner
+from dextron_bench.lessons import CURVE
+
+RESULTS = "results"  # In the leaderboard's folder: a folder of runs less their large files.
+BEGIN, END = "<!-- made by `dextron-bench leaderboard build`: -->", "<!-- end of what was made -->"
+Curves = dict[int, pd.DataFrame]  # By seed; columns epoch, return, success.
+
+
+class NothingToPublish(LookupError):
+    """A folder of runs none of which is finished."""
+
+
+def take(runs: Path, into: Path) -> list[Path]:
+    """Copies results and curves of finished runs into the leaderboard's folder, and weights beside their methods.
+
+    A run is finished when its result holds all rows of all splits that rank methods. Returns the folders of results
+    that were written; raises NothingToPublish, DamagedRun, UnknownMethod, BadSettings.
+    """
+    taken = []
+    for file in sorted(runs.glob(f"*/*/seed*/{records.RESULT}")):
+        result = records.read_result(file)
+        if not _finished(result):
+            continue
+        place = into / RESULTS / file.parent.relative_to(runs)
+        for name in (records.RESULT, CURVE):
+            if (found := file.with_name(name)).exists():
+                _copy(found, place / name)
+        _ship(file.parent, result)
+        taken.append(place)
+    if not taken:
+        raise NothingToPublish(f"no run in {runs} holds all splits that rank methods; `dextron-bench run` makes some")
+    return taken
+
+
+def build(into: Path) -> list[Path]:
+    """Makes the table (CSV), its short form in the README, and the learning curves from the folder's results.
+
+    Returns the files; raises DamagedRun.
+    """
+    from dextron_bench import figures
+
+    rows = leaderboard.table(records.results(into / RESULTS))
+    made = [into / "table.csv", into / "README.md"]
+    provenance.write_whole(made[0], lambda part: rows.to_csv(part, index=False, float_format="%.6g"))
+    _insert(made[1], "\n".join(_sections(rows)))
+    for reaches in rows["reaches"].unique():
+        curves = {label: found for (label, where), found in learning_curves(into / RESULTS).items() if where == reaches}
+        if curves:
+            made.append(into / f"curves-{reaches}.png")
+            figures.learning_curves(curves, rows[rows["reaches"] == reaches], made[-1])
+    return made
+
+
+def learning_curves(runs: Path) -> dict[tuple[str, str], Curves]:
+    """The learning curves of runs, by method and source of reaches; raises DamagedRun."""
+    found: dict[tuple[str, str], Curves] = defaultdict(dict)
+    for file in sorted(runs.glob(f"*/*/seed*/{CURVE}")):
+        result = records.read_result(file.with_name(records.RESULT))
+        points = pd.DataFrame(records.read_json(file)["points"])
+        found[result["method"], result["reaches"]][result["seed"]] = points
+    return found
+
+
+def _finished(result: dict[str, Any]) -> bool:
+    wanted = [splits.load(result["reaches"], name) for name in splits.evaluated(result["reaches"])]
+    have = {name: (found["digest"], len(found["scores"])) for name, found in result["splits"].items()}
+    return all(have.get(split.name) == (split.digest, len(split.cases)) for split in wanted)
+
+
+def _ship(folder: Path, result: dict[str, Any]) -> None:
+    """Puts an installed learner's weights where `eval` finds them; those of a file's stay with whose they are."""
+    config = records.read_json(folder / records.CONFIG)
+    if config["code"]["sha256"]:
+        return
+    method = methods.create(config["code"]["class"], config["settings"])
+    if isinstance(method, Learner):  # A method that takes the policy of another has no weights of its own.
+        _copy(folder / weights.FILE, weights.place(method, result["reaches"]) / f"seed{result['seed']}.safetensors")
+
+
+def _copy(file: Path, place: Path) -> None:
+    provenance.write_whole(place, lambda part: shutil.copyfile(file, part))
+
+
+def _insert(file: Path, text: str) -> None:
+    """Puts text between the marks of a file, which is made where it is not there."""
+    old = file.read_text(encoding="utf-8") if file.exists() else f"# Leaderboard\n\n{BEGIN}\n{END}\n"
+    before, _, rest = old.partition(BEGIN)
+    after = rest.partition(END)[2] or "\n"
+    new = f"{before.rstrip()}\n\n{BEGIN}\n{text}\n{END}{after}"
+    provenance.write_whole(file, lambda part: part.write_text(new, encoding="utf-8"))
+
+
+def _sections(rows: pd.DataFrame) -> Iterator[str]:
+    """The README's tables, as Markdown: for each source, scores on every split, then how episodes of `test` end."""
+    for reaches, group in rows.groupby("reaches", sort=False):
+        names = [name for name in splits.NAMES if name in set(group["split"])]
+        ranked = group[group["split"] == "test"]["method"].tolist()
+        yield f"\n## {reaches} reaches\nMean return of 20 with its 95 % interval, and successes [%].\n"
+        yield _line(["method", "seeds", *(f"`{name}`" for name in names)])
+        yield _line(["---"] * (2 + len(names)))
+        for method in ranked:
+            own = group[group["method"] == method].set_index("split")
+            yield _line([f"`{method}`", own["seeds"].iloc[0], *(_score(own, name) for name in names)])
+        yield "\nHow episodes of `test` end [%] ([docs/diagnosis.md](../docs/diagnosis.md)); closing lag in seconds.\n"
+        yield _line(["method", *CAUSES, "closing lag"])
+        yield _line(["---", *["---:"] * (len(CAUSES) + 1)])
+        for row in group[group["split"] == "test"].to_dict("records"):
+            shares = [f"{100 * row[cause] / row['episodes']:.1f}" for cause in CAUSES]
+            lag = "" if pd.isna(row["closing_lag"]) else f"{row['closing_lag']:.2f}"
+            yield _line([f"`{row['method']}`", *shares, lag])
+
+
+def _score(own: pd.DataFrame, split: str) -> str:
+    if split not in own.index:
+        return ""
+    row = own.loc[split]
+    low, high = f"{row['return_low']:.2f}", f"{row['return_high']:.2f}"
+    return f"{row['return']:.2f} [{low}, {high}], {100 * row['success']:.1f} %"
+
+
+def _line(cells: list[Any]) -> str:
+    return "| " + " | ".join(map(str, cells)) + " |"
