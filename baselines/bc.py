@@ -37,7 +37,7 @@ class Bc(Scheduled):
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """One network a seed, side by side."""
         schedule = SCHEDULES[self.preset]
-        return Cloning(demonstrations.of(track, schedule.episodes), seeds, schedule.epochs, track.device)
+        return Cloning(demonstrations.of(track, schedule.episodes), seeds, track.device)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
         """Plays the network's output."""
@@ -50,10 +50,8 @@ class Cloning:
     A network has the policy's shape, so its second output is there and unused.
     """
 
-    def __init__(
-        self, demos: demonstrations.Demonstrations, seeds: Sequence[int], epochs: int, device: str = "cpu"
-    ) -> None:
-        self.epochs, self.epoch = epochs, 0
+    def __init__(self, demos: demonstrations.Demonstrations, seeds: Sequence[int], device: str = "cpu") -> None:
+        self.epoch = 0
         self._seeds, self._device = list(seeds), device
         rows = demos.transitions()
         self._mean = demos.states[rows].mean(axis=0, dtype=np.float64)

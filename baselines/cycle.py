@@ -29,7 +29,7 @@ class Cycle:
 
     def __init__(self, track: Track, seeds: Sequence[int], schedule: Schedule, demonstrated: int) -> None:
         """Trains one agent a seed; `demonstrated` of the BATCH transitions of each update are an expert's."""
-        self.epochs, self.epoch = schedule.epochs, 0
+        self.epoch = 0
         self._track, self._seeds, self._schedule = track, list(seeds), schedule
         self._demonstrated, self._frames = demonstrated, 0
         agents = len(self._seeds)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal, Self
 
 Preset = Literal["paper", "quick", "smoke"]
 
@@ -25,7 +25,7 @@ class Schedule:
 SCHEDULES: dict[str, Schedule] = {
     "paper": Schedule(epochs=1000, warm_start=10_000, period=10),
     "quick": Schedule(epochs=300, warm_start=10_000, period=10),
-    "smoke": Schedule(epochs=2, warm_start=1_500, period=1, episodes=50),
+    "smoke": Schedule(epochs=2, warm_start=1_000, period=1, episodes=50),
 }
 
 
@@ -50,6 +50,16 @@ class Scheduled:
         return self.name
 
     @property
+    def epochs(self) -> int:
+        """How many there are."""
+        return SCHEDULES[self.preset].epochs
+
+    @property
     def period(self) -> int:
         """Epochs between checkpoints."""
         return SCHEDULES[self.preset].period
+
+    @property
+    def rehearsal(self) -> Self:
+        """The shortest preset: all updates of its last epoch are made, as in those of the others."""
+        return replace(self, preset="smoke")

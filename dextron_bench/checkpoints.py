@@ -80,9 +80,9 @@ class Checkpoints:
         except (tensors.BadTensors, TypeError) as error:
             raise self._damaged(CHECKPOINT) from error
 
-    def save(self, trainer: Trainer, device: str, rows: list[dict[str, Any]], about: dict[str, Any]) -> None:
+    def save(self, trainer: Trainer, done: Progress, rows: list[dict[str, Any]], about: dict[str, Any]) -> None:
         """Writes a checkpoint after a period whose metrics are `rows`; `about` goes with the weights."""
-        epoch = trainer.epoch
+        epoch = done.epoch
         tensors.write(self._journal(epoch), trainer.journal(), {"epoch": epoch})
         frames = {row["seed"]: row.get("frames") for row in rows}
         for seed, arrays in zip(self.seeds, trainer.weights(), strict=True):
@@ -92,7 +92,7 @@ class Checkpoints:
             file.write("".join(json.dumps(row, sort_keys=True) + "\n" for row in rows))
             file.flush()
             os.fsync(file.fileno())
-        tensors.write(self.folder / CHECKPOINT, trainer.state(), asdict(Progress(epoch, trainer.epochs, device)))
+        tensors.write(self.folder / CHECKPOINT, trainer.state(), asdict(done))
 
     def resume(self, trainer: Trainer, device: str) -> None:
         """Puts a trainer where the last checkpoint is and drops what was written after it.

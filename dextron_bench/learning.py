@@ -40,8 +40,7 @@ class Trainer(Protocol):
     the other would have. Both are asked for between epochs only.
     """
 
-    epochs: int  # How many there are.
-    epoch: int  # How many are done.
+    epoch: int  # Epochs done.
 
     def advance(self) -> list[dict[str, float]]:
         """Trains for one epoch; returns what to note of it, for each seed: finite numbers, what is unknown left out.
@@ -71,9 +70,10 @@ class Trainer(Protocol):
 class Learner(Protocol):
     """A method that trains: a frozen dataclass whose fields are its settings, each with a default.
 
-    `label` names its runs and its row and tells settings apart, as "rlil-0.1" does. Every `period` epochs there
-    is a checkpoint and a point of the learning curve. A `home` that is not empty is the source of reaches where
-    it is trained and evaluated, whatever a run asks for: SIM's is "minjerk".
+    `label` names its runs and its row and tells settings apart, as "rlil-0.1" does. Of its `epochs`, every
+    `period` ones there is a checkpoint and a point of the learning curve. A `home` that is not empty is the source
+    of reaches where it is trained and evaluated, whatever a run asks for: SIM's is "minjerk". `rehearsal` is a
+    learner, perhaps itself, of whose epochs the last takes as long as most of this one's: how time is foretold.
     """
 
     name: ClassVar[str]
@@ -83,7 +83,13 @@ class Learner(Protocol):
     def label(self) -> str: ...
 
     @property
+    def epochs(self) -> int: ...
+
+    @property
     def period(self) -> int: ...
+
+    @property
+    def rehearsal(self) -> Learner: ...
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """A trainer at its start, 0 epochs done."""

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from dextron_bench import lessons, records, splits, training
 from dextron_bench.checkpoints import Checkpoints
+from dextron_bench.curve import CURVE
+from dextron_bench.experts import ExpertAgent
+from dextron_bench.rollout import rollout
 from dextron_bench.run import Plan
+from dextron_bench.world import sources
+
+PLAYED = 32  # Episodes from which the time of others is foretold.
 
 
 def outlook(
@@ -16,8 +25,8 @@ def outlook(
 ) -> list[dict[str, Any]]:
     """A row for each training and each evaluation that is not done, in their order; nothing of a run is written.
 
-    `left` is in words, `seconds` an estimate from earlier epochs, else from one that is played, or None. Raises
-    what `run.learn` does.
+    `left` is in words, `seconds` an estimate: of epochs from earlier ones, else from a rehearsal; of episodes from
+    some that their experts play. Raises what `run.learn` does.
     """
     found: dict[str, dict[str, Any]] = {}
     for plans in groups:
@@ -29,25 +38,43 @@ def outlook(
                 if str(folder) not in found:
                     found[str(folder)] = _training(course, group, folder)
         if left := sum(_episodes(plan, runs) for plan in plans):
-            what = {"what": "evaluate", "left": f"{left} episodes", "seconds": None}
-            found[str(plans[0].folder(runs))] = _row(plans[0].label, plans[0], [plan.seed for plan in plans]) | what
+            found[str(plans[0].folder(runs))] = {
+                "what": "evaluate",
+                "method": plans[0].label,
+                "reaches": plans[0].home,
+                "seeds": [plan.seed for plan in plans],
+                "left": f"{left} episodes",
+                "seconds": left * pace(plans[0].home, threads),
+            }
     return list(found.values())
+
+
+@cache
+def pace(reaches: str, threads: int) -> float:
+    """About how long an episode takes [s] when many are played at once, on a source of reaches."""
+    cases = splits.load(reaches, "val").cases[:PLAYED]
+    source = sources.open_source(reaches)
+    began = time.perf_counter()
+    for _ in rollout(ExpertAgent(), source, cases, threads=threads):
+        pass
+    return (time.perf_counter() - began) / len(cases)
 
 
 def _training(course: lessons.Course, group: tuple[int, ...], folder: Path) -> dict[str, Any]:
     learner = course.learner
     progress = Checkpoints(folder, group).progress()
-    left, epochs = (progress.epochs - progress.epoch, progress.epochs) if progress else (None, None)
-    seconds = None if left is None else training.seconds_left(folder, left, learner.period)
-    if left is None:
-        epochs, first = training.measure(learner, course.track(), group)
-        left, seconds = epochs, epochs * first
+    left = learner.epochs - (progress.epoch if progress else 0)
+    seconds = training.seconds_left(folder, left, learner.period)
+    if seconds is None:
+        points = min(CURVE, len(splits.load(course.reaches, "val").cases)) * math.ceil(left / learner.period)
+        seconds = left * training.measure(learner, course.track(), group)
+        seconds += points * len(group) * pace(course.reaches, course.threads)
     return {
         "what": "train",
         "method": learner.label,
         "reaches": course.reaches,
         "seeds": list(group),
-        "left": f"{left} of {epochs} epochs",
+        "left": f"{left} of {learner.epochs} epochs",
         "seconds": seconds,
     }
 
@@ -58,7 +85,3 @@ def _episodes(plan: Plan, runs: Path) -> int:
     done = records.stored(plan.folder(runs), wanted)
     counts = done["split"].value_counts().to_dict() if len(done) else {}
     return sum(len(split.cases) - counts.get(split.name, 0) for split in wanted)
-
-
-def _row(label: str, plan: Plan, seeds: list[int]) -> dict[str, Any]:
-    return {"what": "", "method": label, "reaches": plan.home, "seeds": seeds}

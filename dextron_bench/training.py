@@ -15,7 +15,7 @@ from statistics import median
 from typing import Any
 
 from dextron_bench import methods, provenance, records
-from dextron_bench.checkpoints import Checkpoints
+from dextron_bench.checkpoints import Checkpoints, Progress
 from dextron_bench.curve import Curve
 from dextron_bench.learning import Learner, Track, Trainer
 from dextron_bench.rollout import AgentError, blaming
@@ -89,13 +89,16 @@ def seconds_left(folder: Path, epochs: int, period: int) -> float | None:
     return epochs * median(trained) + math.ceil(epochs / period) * (median(scored) if scored else 0.0)
 
 
-def measure(learner: Learner, track: Track, seeds: Sequence[int]) -> tuple[int, float]:
-    """The number of epochs of a training, and how long its first takes [s]; writes no files of a run."""
-    trainer = _begin(learner, track, seeds)
-    began = time.perf_counter()
-    with blaming(f"epoch 1 of method {learner.label!r}"):
-        trainer.advance()
-    return trainer.epochs, time.perf_counter() - began
+def measure(learner: Learner, track: Track, seeds: Sequence[int]) -> float:
+    """How long an epoch takes [s], from the last of the learner's rehearsal; writes no files of a run."""
+    rehearsal = learner.rehearsal
+    trainer, took = _begin(rehearsal, track, seeds), 0.0
+    while trainer.epoch < rehearsal.epochs:
+        began = time.perf_counter()
+        with blaming(f"epoch {trainer.epoch + 1} of method {rehearsal.label!r}"):
+            trainer.advance()
+        took = time.perf_counter() - began
+    return took
 
 
 class _Lesson:
@@ -109,19 +112,19 @@ class _Lesson:
         trainer = _begin(self._learner, self._track, self._done.seeds)
         self._done.resume(trainer, self._track.device)
         note = self._note()
-        self._report(trainer.epoch, trainer.epochs, note)
-        period = self._learner.period
-        while trainer.epoch < trainer.epochs:
-            last = min((trainer.epoch // period + 1) * period, trainer.epochs)
+        epochs, period = self._learner.epochs, self._learner.period
+        self._report(trainer.epoch, epochs, note)
+        while trainer.epoch < epochs:
+            last = min((trainer.epoch // period + 1) * period, epochs)
             rows: list[dict[str, Any]] = []
             while trainer.epoch < last:
                 rows += self._epoch(trainer)
-                self._report(trainer.epoch, trainer.epochs, note)
-            self._done.save(trainer, self._track.device, rows, self._about())
+                self._report(trainer.epoch, epochs, note)
+            self._done.save(trainer, Progress(last, epochs, self._track.device), rows, self._about())
             began = time.perf_counter()
             note = self._note()
             self._time("evaluation", trainer.epoch, time.perf_counter() - began)
-            self._report(trainer.epoch, trainer.epochs, note)
+            self._report(trainer.epoch, epochs, note)
 
     def _epoch(self, trainer: Trainer) -> list[dict[str, Any]]:
         """One epoch's metrics, a row for each seed."""
@@ -173,14 +176,13 @@ class _Lesson:
 
 
 def _begin(learner: Learner, track: Track, seeds: Sequence[int]) -> Trainer:
-    with blaming(f"trainer() of method {learner.label!r}"):
-        trainer = learner.trainer(track, seeds)
-    if trainer.epochs < 1 or learner.period < 1:
+    if learner.epochs < 1 or learner.period < 1:
         raise AgentError(
             f"method {learner.label!r} needs at least one epoch and a period of at least one; "
-            f"it has {trainer.epochs} and {learner.period}"
+            f"it has {learner.epochs} and {learner.period}"
         )
-    return trainer
+    with blaming(f"trainer() of method {learner.label!r}"):
+        return learner.trainer(track, seeds)
 
 
 def _timings(file: Path) -> list[dict[str, Any]]:

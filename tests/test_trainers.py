@@ -34,7 +34,7 @@ def brief_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
 def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: Schedule = SCHEDULE) -> Trainer:
     track = Track(SOURCE, CASES, folder, threads=1)
     if kind == "bc":
-        return Cloning(of(track), seeds, schedule.epochs)
+        return Cloning(of(track), seeds)
     return Cycle(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
 
 
@@ -53,6 +53,26 @@ def test_a_restored_trainer_goes_on_bit_for_bit(kind: str, tmp_path: Path):
     assert one.keys() == other.keys()
     for name, array in one.items():
         np.testing.assert_array_equal(array, other[name], err_msg=name)
+
+
+@pytest.mark.parametrize("kind", ["rl", "rlil"])
+def test_a_shorter_training_is_the_first_part_of_a_longer_one(kind: str, tmp_path: Path):
+    short, long = (trainer(kind, tmp_path, schedule=Schedule(epochs, 60, 1)) for epochs in (2, 7))
+    for _ in range(2):
+        assert short.advance() == long.advance()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_learning_does_not_depend_on_the_number_of_threads(kind: str, tmp_path: Path):
+    before, notes = torch.get_num_threads(), []
+    try:
+        for threads in (1, 3):
+            torch.set_num_threads(threads)
+            made = trainer(kind, tmp_path)
+            notes.append([made.advance() for _ in range(2)])
+    finally:
+        torch.set_num_threads(before)
+    assert notes[0] == notes[1]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -111,7 +131,7 @@ def test_behaviour_cloning_recovers_an_expert(tmp_path: Path, monkeypatch: pytes
     """Demonstrations of one expert on five settings: a thousand updates bring actions within 0.1 of its own."""
     monkeypatch.setattr("baselines.bc.STEPS", 250)
     demos = of(Track(SOURCE, CASES, tmp_path, threads=1))
-    cloning = Cloning(demos, [0], epochs=4)
+    cloning = Cloning(demos, [0])
     for _ in range(4):
         cloning.advance()
     rows = demos.transitions()

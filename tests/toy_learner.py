@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -52,9 +52,19 @@ class Toy:
         return f"{self.name}-{self.rate:g}"
 
     @property
+    def epochs(self) -> int:
+        """How many there are."""
+        return EPOCHS[self.preset]
+
+    @property
     def period(self) -> int:
         """Epochs between checkpoints."""
         return self.every
+
+    @property
+    def rehearsal(self) -> Toy:
+        """Itself in short."""
+        return replace(self, preset="smoke")
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """At its start."""
@@ -111,7 +121,7 @@ class ToyTrainer:
     """One map and one stream of random numbers a seed; experience grows, and is drawn from."""
 
     def __init__(self, toy: Toy, cases: int, seeds: Sequence[int]) -> None:
-        self._toy, self.epochs, self.epoch = toy, EPOCHS[toy.preset], 0
+        self._toy, self.epoch = toy, 0
         self._streams = [np.random.default_rng([seed, cases]) for seed in seeds]
         self._maps = np.zeros((len(seeds), model.STATE))
         self._offsets = np.zeros(len(seeds))
