@@ -12,10 +12,10 @@ from dextron_bench.world.engine import Engine
 from torch import Tensor
 
 from baselines import demonstrations
-from baselines.normalise import CLIP, Moments, Returns
+from baselines.normalise import CLIP, Moments
 from baselines.policy import STATE
 from baselines.replay import Replay, Transitions
-from baselines.sac import BATCH, DISCOUNT, Batch, Sac
+from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import Schedule
 
 CAPACITY = 1_000_000  # Transitions in either buffer (table II).
@@ -34,7 +34,7 @@ class Cycle:
         self._demonstrated, self._frames = demonstrated, 0
         agents = len(self._seeds)
         self._sac = Sac([self._rng(seed, NETWORKS) for seed in seeds], track.device)
-        self._states, self._returns = Moments(agents, STATE), Returns(agents, DISCOUNT)
+        self._states, self._rewards = Moments(agents, STATE), Moments(agents, 1)
         self._replay = Replay(agents, CAPACITY + CAPACITY // 16)
         self._ids = np.arange(agents)
         self._engine = Engine(agents, track.threads)
@@ -117,18 +117,16 @@ class Cycle:
 
     def _arrays(self) -> Arrays:
         """What training changes in place, by name."""
-        scales = {"states": self._states, "returns": self._returns.moments}
+        scales = {"states": self._states, "rewards": self._rewards}
         found = {f"{of}.{name}": array for of, moments in scales.items() for name, array in vars(moments).items()}
-        return found | {
-            "running": self._returns.running, "now": self._now, "score": self._score, "episodes": self._episodes
-        }  # fmt: skip
+        return found | {"now": self._now, "score": self._score, "episodes": self._episodes}
 
     def _live(self, actions: np.ndarray, scores: list[list[float]]) -> None:
         """Plays actions (S, 1) and keeps what came of them; notes the scores of episodes that ended."""
         self._states.see(self._now)
         step = self._engine.step(self._ids, actions)
         ended = step.ended
-        self._returns.see(step.rewards, ended)
+        self._rewards.see(step.rewards[:, None])
         before, taken, rewards, after = (
             array.astype(np.float32) for array in (self._now, actions[:, 0], step.rewards, step.states)
         )
@@ -171,7 +169,7 @@ class Cycle:
         mean, deviation = (array[:, None].astype(np.float32) for array in scale)
         both = np.concatenate([parts.states, parts.nexts], axis=1)
         scaled = self._tensor((both - mean) / deviation).clamp_(-CLIP, CLIP)
-        rewards = np.clip(parts.rewards / self._returns.moments.deviation, -CLIP, CLIP)
+        rewards = np.clip(parts.rewards / self._rewards.deviation, -CLIP, CLIP)
         columns = (parts.actions, rewards, ~parts.terminated)
         actions, rewards, alive = (self._tensor(array)[..., None] for array in columns)
         return Batch(scaled[:, :BATCH], actions, rewards, scaled[:, BATCH:], alive)

@@ -28,19 +28,3 @@ class Moments:
     def deviation(self) -> np.ndarray:
         """Standard deviations (S, size), never 0."""
         return np.sqrt(self.variance + EPSILON)
-
-
-class Returns:
-    """The deviation of each agent's discounted return so far, by which its rewards are divided."""
-
-    def __init__(self, agents: int, discount: float) -> None:
-        self._discount = discount
-        self.moments = Moments(agents, 1)
-        self.running = np.zeros((agents, 1))
-
-    def see(self, rewards: np.ndarray, ended: np.ndarray) -> None:
-        """Takes in one reward for each agent, (S,), and whether its episode ended there, (S,)."""
-        self.running *= self._discount
-        self.running += rewards[:, None]
-        self.moments.see(self.running)
-        self.running[ended] = 0.0

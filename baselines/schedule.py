@@ -24,7 +24,7 @@ class Schedule:
 # All of `quick` but its end is that of `paper`: one is the first epochs of the other, bit for bit.
 SCHEDULES: dict[str, Schedule] = {
     "paper": Schedule(epochs=1000, warm_start=10_000, period=10),
-    "quick": Schedule(epochs=300, warm_start=10_000, period=10),
+    "quick": Schedule(epochs=200, warm_start=10_000, period=10),
     "smoke": Schedule(epochs=2, warm_start=1_000, period=1, episodes=50),
 }
 

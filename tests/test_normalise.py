@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.normalise import EPSILON, PRIOR, Moments, Returns
+from baselines.normalise import EPSILON, PRIOR, Moments
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=40))
@@ -25,13 +25,3 @@ def test_agents_have_streams_of_their_own():
     np.testing.assert_allclose(moments.mean[:, 0], [2.0, 10.0], rtol=1e-3)
     np.testing.assert_allclose(moments.deviation[:, 0], [1.0, 0.0], atol=0.08)
     assert Moments(1, 1).deviation[0, 0] == np.sqrt(1.0 + EPSILON)
-
-
-def test_returns_are_discounted_and_begin_anew_with_each_episode():
-    returns = Returns(1, discount=0.5)
-    seen = []
-    for reward, ended in ((1.0, False), (1.0, False), (0.0, True), (1.0, False)):
-        returns.see(np.array([reward]), np.array([ended]))
-        seen.append(returns.moments.mean[0, 0])
-    np.testing.assert_allclose(seen, [1.0, 1.25, 3.25 / 3, 4.25 / 4], rtol=2e-4)  # of 1, 1.5, 0.75 and 1
-    assert returns.running[0, 0] == 1.0
