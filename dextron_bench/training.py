@@ -16,7 +16,7 @@ from typing import Any
 
 from dextron_bench import methods, provenance, records
 from dextron_bench.checkpoints import Checkpoints, Progress
-from dextron_bench.curve import Curve
+from dextron_bench.curve import FINALISTS, Curve
 from dextron_bench.learning import Learner, Track, Trainer
 from dextron_bench.rollout import AgentError, blaming
 from dextron_bench.splits import Split
@@ -63,6 +63,7 @@ def train(
         done.finish()
         curve.extend()
         for seed in seeds:
+            report(learner.epochs, learner.epochs, f"choosing between the {FINALISTS} best of seed {seed}")
             curve.best(seed)
     return done
 

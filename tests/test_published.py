@@ -1,0 +1,67 @@
+"""The published leaderboard is what the package computes: its results, its tables, and the weights that ship."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import baselines
+from dextron_bench import cli, lessons, methods, records, rollout, splits, tensors, weights
+from dextron_bench.learning import Learner
+from dextron_bench.world import sources
+
+BOARD = Path(__file__).parents[1] / "leaderboard"
+RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))
+WEIGHTS = sorted((Path(baselines.__file__).parent / "weights").glob("*/*/seed*.safetensors"))
+
+
+def name(file: Path) -> str:
+    """Method, source of reaches and seed of a file, as a folder of runs has them."""
+    return "/".join([*file.parts[-4:-1]] if file.name == records.RESULT else [*file.parts[-3:-1], file.stem])
+
+
+@pytest.mark.parametrize("file", RESULTS, ids=name)
+def test_a_result_is_whole_and_of_the_splits_that_ship(file: Path):
+    result = records.read_result(file)
+    assert name(file) == f"{result['method']}/{result['reaches']}/seed{result['seed']}"
+    for wanted in splits.evaluated(result["reaches"]):
+        split, found = splits.load(result["reaches"], wanted), result["splits"][wanted]
+        assert found["digest"] == split.digest
+        assert len(found["scores"]) == sum(found["causes"].values()) == len(split.cases)
+        assert found["causes"].get("solved", 0) == found["scores"].count(20.0)
+        assert found["failed"] == 0
+
+
+def test_tables_and_curves_are_rebuilt_from_the_results(tmp_path: Path):
+    again = tmp_path / "board"
+    shutil.copytree(BOARD, again)
+    assert cli.main(["leaderboard", "build", "--into", str(again)]) == 0
+    for made in ("README.md", "table.csv"):
+        assert (again / made).read_text() == (BOARD / made).read_text()
+    assert {file.name for file in again.glob("*.png")} == {file.name for file in BOARD.glob("*.png")}
+
+
+@pytest.mark.parametrize("file", WEIGHTS, ids=name)
+def test_weights_that_ship_are_those_of_the_result(file: Path):
+    result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
+    assert result["training"] == weights.about(file)
+    points = records.read_json(BOARD / "results" / name(file) / lessons.CURVE)["points"]
+    assert result["training"]["best_epoch"] in [point["epoch"] for point in points]
+
+
+@pytest.mark.parametrize("rows", [2, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("file", WEIGHTS, ids=name)
+def test_weights_that_ship_score_what_was_published(file: Path, rows: int, request: pytest.FixtureRequest):
+    """Bit for bit, so the sums of rewards are equal; `dextron-bench eval` does the same for every row."""
+    about, reaches = tensors.read_about(file), file.parent.name
+    if reaches == "real":
+        request.getfixturevalue("release")
+    learner = methods.create(about["method"], about["settings"])
+    assert isinstance(learner, Learner)
+    split = splits.load(reaches, "test")
+    agent, source = weights.agent(learner, file), sources.open_source(reaches)
+    found = {index: each.score for index, each in rollout.rollout(agent, source, split.cases[:rows])}
+    result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
+    assert [found[row] for row in range(rows)] == result["splits"]["test"]["scores"][:rows]
