@@ -35,7 +35,7 @@ class Tally:
 
 def claim(search: dict[str, Any], folder: Path) -> None:
     """Makes the folder this search's, or checks that it is."""
-    wanted = {"search": search, "physics": model.mjcf_hash()}
+    wanted = json.loads(json.dumps({"search": search, "physics": model.mjcf_hash()}))
     file = folder / "search.json"
     if not file.exists():
         provenance.write_json(file, wanted)

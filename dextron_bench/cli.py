@@ -15,7 +15,7 @@ from typing import Annotated, Any, Protocol, Union
 
 import tyro
 
-from dextron_bench.verbs import data, data_model, doctor, figures, leaderboard, mc, run, settings, splits, view
+from dextron_bench.verbs import data, data_model, doctor, figures, leaderboard, mc, run, settings, splits, success, view
 from dextron_bench.verbs import eval as evaluation
 from dextron_bench.verbs import list as listing
 
@@ -46,6 +46,10 @@ VERBS: dict[str, type[Verb] | Group] = {
     ),
     "mc": mc.MonteCarlo,
     "splits": splits.Splits,
+    "success": (
+        "The success model: play its data set, train it.",
+        {"data": success.Data, "train": success.Train},
+    ),
     "figures": figures.Figures,
     "doctor": doctor.Doctor,
 }

@@ -14,6 +14,7 @@ from safetensors.numpy import load, save
 from dextron_bench import provenance
 
 ABOUT = "about"  # The one key of a file's metadata, as the order of several would be left to chance.
+KINDS = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
 LENGTH = 8  # [bytes] of the header's own length at the start of a file.
 
 
@@ -42,6 +43,18 @@ def read(file: Path) -> dict[str, np.ndarray]:
         raise BadTensors(file, " ".join(str(error).split()) or type(error).__name__) from error
 
 
+def mapped(file: Path) -> dict[str, np.ndarray]:
+    """The arrays of a file, read-only and left on the disk until they are looked at; raises BadTensors, OSError."""
+    with file.open("rb") as opened:
+        length = int.from_bytes(opened.read(LENGTH), "little")
+        header = opened.read(min(length, file.stat().st_size))
+    try:
+        entries = {name: entry for name, entry in json.loads(header).items() if name != "__metadata__"}
+        return {name: _mapped(file, LENGTH + length, entry) for name, entry in entries.items()}
+    except (ValueError, AttributeError, TypeError, KeyError, RecursionError) as error:
+        raise BadTensors(file, error) from error
+
+
 def read_about(file: Path) -> dict[str, Any]:
     """What a file says that it is about, empty where it says nothing; raises BadTensors, OSError."""
     with file.open("rb") as opened:
@@ -57,6 +70,14 @@ def read_about(file: Path) -> dict[str, Any]:
 def sha256(file: Path) -> str:
     """The SHA-256 of a file, hexadecimal."""
     return hashlib.sha256(_content(file)).hexdigest()
+
+
+def _mapped(file: Path, start: int, entry: Mapping[str, Any]) -> np.ndarray:
+    kind, shape = np.dtype(KINDS[entry["dtype"]]), tuple(entry["shape"])
+    begin, end = entry["data_offsets"]
+    if end - begin != kind.itemsize * int(np.prod(shape)):
+        raise ValueError(f"an array of shape {shape} has {end - begin} bytes")
+    return np.memmap(file, kind, "r", start + begin, shape)
 
 
 def _content(file: Path) -> bytes:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench import provenance, tensors
+from dextron_bench import methods, provenance, tensors
 from dextron_bench.learning import Learner
 from dextron_bench.records import RunMismatch
 from dextron_bench.rollout import Agent, AgentError, blaming
@@ -72,6 +72,17 @@ def agent(learner: Learner, file: Path) -> Agent:
     if shape != (1, 1):
         raise BadWeights(f"{file} holds no weights that fit {learner.label!r}: actions of shape {shape} for one state")
     return learner.policy(arrays)
+
+
+def own(file: Path) -> Agent:
+    """The agent of a file that says whose weights it holds; raises BadWeights, UnknownMethod, BadTensors, OSError."""
+    found = tensors.read_about(file)
+    if not {"method", "settings"} <= found.keys():
+        raise BadWeights(f"{file} does not say which method's weights it holds")
+    learner = methods.create(found["method"], found["settings"])
+    if not isinstance(learner, Learner):
+        raise BadWeights(f"{file} says it holds weights of {found['method']!r}, which has none")
+    return agent(learner, file)
 
 
 def adopt(file: Path, folder: Path) -> Path:

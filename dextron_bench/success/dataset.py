@@ -1,0 +1,49 @@
+"""Reading the data set in batches, straight from the disk: memory grows with its episodes, not with its transitions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dextron_bench import tensors
+from dextron_bench.world import model
+
+HELD = 5  # Every so many episodes of a block one is for testing: 80 % and 20 %, by episode (paper, II.E).
+
+
+class EmptyDataset(LookupError):
+    """A folder that holds no blocks."""
+
+
+class Dataset:
+    """The transitions of four in five of the episodes in a folder, or of the others; numbered from 0."""
+
+    def __init__(self, folder: Path, test: bool = False) -> None:
+        """Takes the episodes to learn from, or those for testing; raises EmptyDataset, BadTensors."""
+        files = sorted((folder / "blocks").glob("[0-9]*.safetensors"))
+        if not files:
+            raise EmptyDataset(f"{folder} holds no data set; make one with `dextron-bench success data`")
+        self._blocks = [tensors.mapped(file) for file in files]
+        chosen = [np.arange(len(block["solved"])) % HELD == HELD - 1 for block in self._blocks]
+        chosen = [held == test for held in chosen]
+        pairs = list(zip(self._blocks, chosen, strict=True))
+        self._of = np.repeat(np.arange(len(files)), [mine.sum() for mine in chosen])
+        self._begins = np.concatenate([block["starts"][:-1][mine] for block, mine in pairs])
+        self._solved = np.concatenate([block["solved"][mine] for block, mine in pairs])
+        self._ends = np.cumsum(np.concatenate([np.diff(block["starts"])[mine] for block, mine in pairs]))
+
+    def __len__(self) -> int:
+        return int(self._ends[-1])
+
+    def take(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States (B, 48), actions (B,), float32, and outcomes (B,), 1 for success, of transitions `places` (B,)."""
+        episodes = np.searchsorted(self._ends, places, side="right")
+        firsts = np.append(0, self._ends)[episodes]
+        rows, of = self._begins[episodes] + places - firsts, self._of[episodes]
+        states, actions = np.empty((len(places), model.STATE), np.float32), np.empty(len(places), np.float32)
+        for number in np.unique(of):
+            mine = of == number
+            states[mine] = self._blocks[number]["states"][rows[mine]]
+            actions[mine] = self._blocks[number]["actions"][rows[mine]]
+        return states, actions, self._solved[episodes].astype(np.int64)

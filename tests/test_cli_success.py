@@ -1,0 +1,49 @@
+"""The success model from the command line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tiny
+import toy_world
+
+from dextron_bench import cli, tensors
+from dextron_bench.success import collection, fit
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty working folder in the tiny world, with small blocks."""
+    toy_world.install(toy_world.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.setattr(collection.Collection.__init__, "__defaults__", ("synthetic", 0, (), 5))
+    monkeypatch.setattr(fit.Fit.__init__, "__defaults__", (30, 2, 8, 1e-3, 100, 0))
+    monkeypatch.setattr("baselines.bc.STEPS", 2)
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    tiny.forget()
+
+
+def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.CaptureFixture[str]):
+    run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
+    assert cli.main(run) == 0
+    words = ["--policies", "runs/bc-smoke/synthetic/seed0/weights.safetensors", "--rows", "1500", "--quiet"]
+    capsys.readouterr()
+    assert cli.main(["success", "data", *words, "--json"]) == 0
+    rows = {row["kind"]: row for row in json.loads(capsys.readouterr().out)}
+    assert rows.keys() >= {"solved", "policy", "all"}
+    assert rows["solved"]["success_rate"] == 1.0
+    assert rows["all"]["rows"] == sum(row["rows"] for kind, row in rows.items() if kind != "all") >= 1500
+    assert cli.main(["success", "train", "--epochs", "2", "--quiet"]) == 0
+    assert "model.safetensors" in capsys.readouterr().out
+    assert [point["epoch"] for point in fit.curve(here / "runs/success/synthetic/seed0")] == [1, 2]
+
+
+def test_what_cannot_be_is_one_line(here: Path, complaint: Callable[..., str]):
+    assert "make one with `dextron-bench success data`" in complaint("success", "train", "--quiet")
+    assert "No such file" in complaint("success", "data", "--policies", "none.safetensors")
+    tensors.write(here / "odd.safetensors", {"a": np.zeros(2)}, {})
+    assert "does not say which method's weights" in complaint("success", "data", "--policies", "odd.safetensors")
