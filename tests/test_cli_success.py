@@ -40,6 +40,13 @@ def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.C
     assert cli.main(["success", "train", "--epochs", "2", "--quiet"]) == 0
     assert "model.safetensors" in capsys.readouterr().out
     assert [point["epoch"] for point in fit.curve(here / "runs/success/synthetic/seed0")] == [1, 2]
+    assert cli.main(["success", "eval", "--split", "test", *words[:2], "--json"]) == 0
+    experts, policy = json.loads(capsys.readouterr().out)
+    assert (experts["split"], experts["player"], policy["player"]) == ("test", "experts", words[1])
+    assert 0.0 < experts["base_rate"] < 1.0  # Those of the rows succeed, those drawn do not.
+    assert sum(experts["predictions"]) == experts["rows"]
+    assert len(experts["auc_by_time"]) == 11
+    assert cli.main(["success", "eval", "--split", "test"]) == 0
 
 
 def test_what_cannot_be_is_one_line(here: Path, complaint: Callable[..., str]):

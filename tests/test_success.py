@@ -20,7 +20,7 @@ from dextron_bench.success.collection import POLICY, SOLVED, UNIFORM, BadCollect
 from dextron_bench.success.collection import file_of as block_file
 from dextron_bench.success.dataset import Dataset, EmptyDataset
 from dextron_bench.success.fit import MODEL, BadFit, Fit, fit
-from dextron_bench.success.network import GRID, SuccessModel
+from dextron_bench.success.network import GRID, BadModel, SuccessModel
 
 TRAIN = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 SMALL = Collection("synthetic", block=5, policies=("nothing",))
@@ -147,6 +147,10 @@ def test_a_model_comes_back_from_its_arrays():
     model, states = made(), np.ones((2, 48))
     again = SuccessModel.of(model.arrays())
     np.testing.assert_array_equal(again.curve(states), model.curve(states))
+    with pytest.raises(BadModel, match="KeyError: 'mean'"):
+        SuccessModel.of({"layer.0": np.zeros(3)})
+    with pytest.raises(BadModel, match="not finite"):
+        SuccessModel.of(model.arrays() | {"mean": np.full(48, np.nan)})
 
 
 # Training

@@ -15,6 +15,10 @@ GRID = np.linspace(-1.0, 1.0, 51)  # The actions of a curve (paper, fig. 5).
 CLIP = 10.0  # Scaled states are clipped to this far from 0.
 
 
+class BadModel(ValueError):
+    """Arrays that make no success model."""
+
+
 class SuccessModel:
     """A perceptron of three layers and two classes; states scaled by a fixed mean and deviation (48,)."""
 
@@ -66,9 +70,14 @@ class SuccessModel:
 
     @classmethod
     def of(cls, arrays: Mapping[str, np.ndarray]) -> SuccessModel:
-        """The model that gave these arrays."""
-        made = cls(arrays["mean"], arrays["deviation"])
-        with torch.no_grad():
-            for i, parameter in enumerate(made.network.parameters()):
-                parameter.copy_(torch.tensor(arrays[f"layer.{i}"]))
+        """The model that gave these arrays; raises BadModel."""
+        try:
+            made = cls(arrays["mean"], arrays["deviation"])
+            with torch.no_grad():
+                for i, parameter in enumerate(made.network.parameters()):
+                    parameter.copy_(torch.tensor(arrays[f"layer.{i}"]))
+        except (KeyError, RuntimeError, TypeError) as error:
+            raise BadModel(f"these arrays are no success model ({type(error).__name__}: {error})") from error
+        if not all(np.isfinite(array).all() for array in arrays.values()):
+            raise BadModel("a success model with numbers that are not finite")
         return made

@@ -92,6 +92,56 @@ class Train:
         return 0
 
 
+@dataclass(frozen=True)
+class Eval:
+    """Judge a success model on episodes that it never saw: of experts, and of trained policies, on splits.
+
+    Half of the experts' episodes are played by experts that solve their setting, half by experts drawn uniformly.
+
+    Example: dextron-bench success eval --reaches synthetic --policies runs/*/synthetic/seed*/weights.safetensors
+    """
+
+    reaches: Literal["real", "synthetic"] = "synthetic"
+    """The source of reaches."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
+    """The model; by default the one that `success train` made of the data set with seed 0."""
+    split: tuple[str, ...] = ()
+    """The splits; by default all that rank methods."""
+    rows: int = 200
+    """Settings of each split that are played."""
+    policies: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.safetensors")] = ()
+    """Weights of policies whose episodes are foretold too."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    threads: int = 0
+    """Threads of the simulation; 0 takes one for each processor."""
+    json: bool = False
+    """Print the rows as JSON, with the AUC by time of the reach, and the calibration."""
+
+    def __call__(self) -> int:
+        from dextron_bench import splits, tensors, weights
+        from dextron_bench.success import evaluation, fit
+        from dextron_bench.success.network import SuccessModel
+        from dextron_bench.world.sources import open_source
+
+        file = self.model or folder_of(self.runs, self.reaches, 0) / fit.MODEL
+        model, source = SuccessModel.of(tensors.read(file)), open_source(self.reaches)
+        players = {"experts": None} | {str(policy): weights.own(policy) for policy in self.policies}
+        rows = []
+        for name in self.split or splits.evaluated(self.reaches):
+            cases = splits.load(self.reaches, name).cases[: self.rows]
+            for player, agent in players.items():
+                played = cases if agent else evaluation.contrasted(cases)
+                found = evaluation.evaluate(model, source, played, agent, self.threads)
+                rows.append({"split": name, "player": player, **found.about()})
+        if self.json:
+            print_json(rows)
+        else:
+            columns = [column for column, value in rows[0].items() if not isinstance(value, list)]
+            print_table("success model", columns, [[row[column] for column in columns] for row in rows])
+        return 0
+
+
 def folder_of(runs: Path, reaches: str, seed: int) -> Path:
     """Where a data set lives, and what is trained on it."""
     return runs / "success" / reaches / f"seed{seed}"
