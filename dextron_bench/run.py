@@ -141,8 +141,10 @@ def shipped(plan: Plan, seeds: Sequence[int]) -> list[Plan]:
         raise weights.MissingWeights(f"method {method.name!r} has no weights: `dextron-bench run` evaluates it")
     found = weights.shipped(learner, methods.home(learner, plan.reaches))
     if lost := [seed for seed in seeds or (0,) if seed not in found and (seeds or not found)]:
+        others = weights.labels(learner, methods.home(learner, plan.reaches))
         raise weights.MissingWeights(
             f"no weights of {plan.label!r} on {plan.reaches} reaches ship for seed {lost[0]}; train them with "
             f"`dextron-bench run {methods.words(plan.method, plan.settings)} --reaches {plan.reaches} --seed {lost[0]}`"
+            + (f", or take what ships: {', '.join(others)}" if others else "")
         )
     return [replace(plan, seed=seed, weights=found[seed]) for seed in seeds or found]

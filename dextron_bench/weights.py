@@ -39,6 +39,11 @@ def shipped(learner: Learner, reaches: str) -> dict[int, Path]:
     return {int(seed): found[seed] for seed in sorted(found, key=lambda s: (len(s), s)) if seed.isdigit()}
 
 
+def labels(learner: Learner, reaches: str) -> list[str]:
+    """What weights for a source of reaches ship beside a method's code, its own or its neighbours'."""
+    return sorted(found.parent.name for found in place(learner, reaches).parents[1].glob(f"*/{reaches}"))
+
+
 def about(file: Path) -> dict[str, Any]:
     """What a file's weights come from, and the SHA-256 of the file; raises BadTensors, OSError."""
     found = tensors.read_about(file)
