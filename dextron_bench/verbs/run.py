@@ -68,7 +68,8 @@ class Run:
 
         asked = methods.paper(**chosen(self.settings)) if self.all else [(self.method, chosen(self.settings))]
         plans = [run.Plan(spec, self.reaches, self.split, 0, self.record, settings) for spec, settings in asked]
-        plans += [run.Plan(name, self.reaches, self.split, 0) for name in FLOORS if self.floors and name != self.method]
+        reaches = self.reaches if self.all else plans[0].home
+        plans += [run.Plan(name, reaches, self.split, 0) for name in FLOORS if self.floors and name != self.method]
         plans = [replace(plan, splits=plan.splits or splits.evaluated(plan.home)) for plan in plans]
         return [[replace(plan, seed=seed) for seed in dict.fromkeys(self.seed)] for plan in plans]
 
