@@ -66,12 +66,16 @@ def build(into: Path) -> list[Path]:
 
 
 def learning_curves(runs: Path) -> dict[tuple[str, str], Curves]:
-    """The learning curves of runs, by method and source of reaches; raises DamagedRun."""
+    """The learning curves of runs that live in the world, by method and source of reaches; raises DamagedRun.
+
+    What has no frames, as cloning has none, has no place on their axis.
+    """
     found: dict[tuple[str, str], Curves] = defaultdict(dict)
     for file in sorted(runs.glob(f"*/*/seed*/{CURVE}")):
         result = records.read_result(file.with_name(records.RESULT))
         points = pd.DataFrame(records.read_json(file)["points"])
-        found[result["method"], result["reaches"]][result["seed"]] = points
+        if result["training"]["frames"] is not None:
+            found[result["method"], result["reaches"]][result["seed"]] = points
     return found
 
 
