@@ -47,8 +47,8 @@ VERBS: dict[str, type[Verb] | Group] = {
     "mc": mc.MonteCarlo,
     "splits": splits.Splits,
     "success": (
-        "The success model: play its data set, train it, judge it.",
-        {"data": success.Data, "train": success.Train, "eval": success.Eval},
+        "The success model: play its data set, train it, judge it, explain episodes by it.",
+        {"data": success.Data, "train": success.Train, "eval": success.Eval, "explain": success.Explain},
     ),
     "figures": figures.Figures,
     "doctor": doctor.Doctor,

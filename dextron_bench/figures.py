@@ -11,8 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from mpl_toolkits.mplot3d import Axes3D
 
+from dextron_bench.success.explanation import Foresight
+from dextron_bench.success.network import GRID
 from dextron_bench.world.setting import Setting, Source, Stratum, from_frame
 
+RIDGES = 40  # Curves of an episode, about.
 FORMATS = (".pdf", ".png", ".svg")
 HUES = ("Blues", "Oranges", "Greens", "Greys")  # One for each angle; a ring farther out is darker.
 BOTTLE_RADIUS, BOTTLE_HEIGHT = 0.025, 0.25  # [m]
@@ -93,6 +96,29 @@ def learning_curves(curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFra
     axes.set(xlabel="epochs of 1,000 frames", ylabel="sum of rewards", ylim=(0.0, 20.5), xlim=(0.0, None))
     axes.set_title("Mean and range over seeds on 50 settings of val")
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+    figure.savefig(file, dpi=150)
+
+
+def ridges(curves: dict[str, Foresight], file: Path) -> None:
+    """Draws what the success model thinks of every action, a curve a step, for titled episodes (paper, Fig. 5).
+
+    Time, as a share of the reach, goes up; a tick marks the action that was chosen. Green curves foretell the outcome,
+    red ones do not. Raises UnknownFormat, OSError.
+    """
+    _check(file)
+    figure = Figure(figsize=(2.6 * len(curves), 5), layout="constrained")
+    panels = figure.subplots(1, len(curves), sharey=True, squeeze=False)[0]
+    for axes, (title, seen) in zip(panels, curves.items(), strict=True):
+        shown = range(0, len(seen.times), max(1, len(seen.times) // RIDGES))
+        height = 2.5 * seen.times[-1] / len(shown)
+        for k in reversed(shown):  # Later steps lie behind.
+            base, colour = seen.times[k], "tab:green" if seen.right[k] else "tab:red"
+            axes.fill_between(GRID, base, base + height * seen.curves[k], color=colour, alpha=0.5, linewidth=0)
+            axes.plot(GRID, base + height * seen.curves[k], color="0.2", linewidth=0.4)
+            axes.plot([seen.episode.actions[k, 0]] * 2, [base, base + 0.5 * height], color="black", linewidth=1)
+        axes.set_title(title, fontsize=8, wrap=True)
+        axes.set(xlabel="action", xlim=(-1.0, 1.0))
+    panels[0].set_ylabel("time, as a share of the reach")
     figure.savefig(file, dpi=150)
 
 

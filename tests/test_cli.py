@@ -271,6 +271,7 @@ def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
         ["success", "data"],
         ["success", "train"],
         ["success", "eval"],
+        ["success", "explain"],
     ],
 )
 def test_help_of_a_verb_has_an_example(words: list[str], capsys: pytest.CaptureFixture[str]):

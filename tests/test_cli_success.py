@@ -47,6 +47,9 @@ def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.C
     assert sum(experts["predictions"]) == experts["rows"]
     assert len(experts["auc_by_time"]) == 11
     assert cli.main(["success", "eval", "--split", "test"]) == 0
+    assert cli.main(["success", "explain", *words[:2], "--into", "pictures/fig5.png"]) == 0
+    assert "expert" in capsys.readouterr().out
+    assert (here / "pictures" / "fig5.png").exists()
 
 
 def test_what_cannot_be_is_one_line(here: Path, complaint: Callable[..., str]):

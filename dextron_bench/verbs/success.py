@@ -142,6 +142,65 @@ class Eval:
         return 0
 
 
+@dataclass(frozen=True)
+class Explain:
+    """Draw what a success model thinks at every step of five kinds of episodes that it finds by itself (Fig. 5).
+
+    Example: dextron-bench success explain --reaches synthetic --policies runs/*/synthetic/seed*/weights.safetensors
+    """
+
+    reaches: Literal["real", "synthetic"] = "synthetic"
+    """The source of reaches."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
+    """The model; by default the one that `success train` made of the data set with seed 0."""
+    split: str = "test"
+    """The split on which experts and policies are played."""
+    rows: int = 100
+    """Settings of it that are played."""
+    policies: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.safetensors")] = ()
+    """Weights of the policies among which episodes are sought."""
+    into: Path = Path("figures/fig5.png")
+    """The picture."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    threads: int = 0
+    """Threads of the simulation; 0 takes one for each processor."""
+
+    def __call__(self) -> int:
+        from dextron_bench import diagnosis, figures, rollout, splits, tensors, weights
+        from dextron_bench.experts import ExpertAgent
+        from dextron_bench.success import explanation, fit
+        from dextron_bench.success.network import SuccessModel
+        from dextron_bench.world.sources import open_source
+
+        file = self.model or folder_of(self.runs, self.reaches, 0) / fit.MODEL
+        model, source = SuccessModel.of(tensors.read(file)), open_source(self.reaches)
+        cases = splits.load(self.reaches, self.split).cases[: self.rows]
+        players = {explanation.EXPERT: ExpertAgent()} | {str(policy): weights.own(policy) for policy in self.policies}
+        found = explanation.choose(
+            explanation.foresee(model, source, player, episode, diagnosis.diagnose(episode, cases[row]))
+            for player, agent in players.items()
+            for row, episode in sorted(rollout.rollout(agent, source, cases, threads=self.threads), key=lambda e: e[0])
+        )
+        self.into.parent.mkdir(parents=True, exist_ok=True)
+        figures.ridges({explanation.KINDS[kind]: seen for kind, seen in found.items()}, self.into)
+        columns = ["kind", "player", "reach", "return", "cause", "steps foretold [%]"]
+        cells = [
+            [
+                kind,
+                seen.player,
+                seen.episode.setting.reach,
+                seen.episode.score,
+                seen.diagnosis.cause,
+                seen.foretold * 100,
+            ]
+            for kind, seen in found.items()
+        ]
+        print_table("episodes", columns, cells)
+        print(self.into)
+        return 0
+
+
 def folder_of(runs: Path, reaches: str, seed: int) -> Path:
     """Where a data set lives, and what is trained on it."""
     return runs / "success" / reaches / f"seed{seed}"

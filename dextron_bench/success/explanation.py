@@ -1,0 +1,86 @@
+"""What the success model thinks while an episode runs, and the five kinds of episodes that the paper shows (Fig. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from dextron_bench.diagnosis import Diagnosis
+from dextron_bench.rollout import Episode
+from dextron_bench.success.network import SuccessModel
+from dextron_bench.world import model as world
+from dextron_bench.world.setting import Source
+
+KINDS = {
+    "fading": "hope that fades by wrong actions",
+    "early": "a closing that came too early",
+    "expert": "right for an expert",
+    "policy": "right for a policy",
+    "wrong": "the model is wrong",
+}
+EXPERT = "expert"  # Who acts where it is no policy.
+OPEN = 0.6  # A window of hope is open where the best action has this chance at least.
+SHUT = 0.2  # It is shut where even the best has this chance at most.
+
+
+@dataclass(frozen=True, slots=True)
+class Foresight:
+    """An episode as the model foretells it: curves (T, 51), the chosen actions' chances (T,), and times (T,).
+
+    Times are shares of the reach's duration; `player` says who acts, "expert" or a policy's name.
+    """
+
+    player: str
+    episode: Episode
+    diagnosis: Diagnosis
+    curves: np.ndarray
+    chances: np.ndarray
+    times: np.ndarray
+
+    @property
+    def right(self) -> np.ndarray:
+        """True for the steps (T,) at which the outcome is foretold."""
+        return (self.chances > 0.5) == self.episode.success
+
+    @property
+    def foretold(self) -> float:
+        """The share of steps at which the outcome is foretold."""
+        return float(self.right.mean())
+
+
+def foresee(model: SuccessModel, source: Source, player: str, episode: Episode, diagnosis: Diagnosis) -> Foresight:
+    """What the model thinks at each step of an episode."""
+    before, actions = episode.states[:-1], episode.actions[:, 0]
+    times = np.arange(len(actions)) * world.CONTROL_STEP / source.duration(episode.setting)
+    return Foresight(player, episode, diagnosis, model.curve(before), model.chance(before, actions), times)
+
+
+def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:
+    """The clearest episode of each of KINDS, those left out of which there is none."""
+    best: dict[str, tuple[float, Foresight]] = {}
+    for each in seen:
+        for kind, score in _scores(each).items():
+            if kind not in best or score > best[kind][0]:
+                best[kind] = score, each
+    return {kind: best[kind][1] for kind in KINDS if kind in best}
+
+
+def _scores(seen: Foresight) -> dict[str, float]:
+    """How clear an episode is as each of the kinds that it can be."""
+    own = seen.player != EXPERT
+    found = {"wrong": 1.0 - seen.foretold}
+    if seen.episode.success:
+        found["policy" if own else "expert"] = seen.foretold
+    elif own and seen.diagnosis.cause == "too early":
+        found["early"] = _fall(seen.chances)
+    elif own and (seen.curves.max(axis=1) >= OPEN).any() and seen.curves[-1].max() <= SHUT:
+        found["fading"] = seen.foretold * float((seen.curves.max(axis=1) - seen.chances).mean())
+    return found
+
+
+def _fall(chances: np.ndarray) -> float:
+    """The largest drop of chances (T,) within a quarter of a second."""
+    lag = min(int(0.25 / world.CONTROL_STEP), len(chances) - 1)
+    return float((chances[:-lag] - chances[lag:]).max()) if lag else 0.0
