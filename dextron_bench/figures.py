@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -11,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from mpl_toolkits.mplot3d import Axes3D
 
-from dextron_bench.success.explanation import Foresight
-from dextron_bench.success.network import GRID
 from dextron_bench.world.setting import Setting, Source, Stratum, from_frame
+
+if TYPE_CHECKING:
+    from dextron_bench.success.explanation import Foresight
 
 RIDGES = 40  # Curves of an episode, about.
 FORMATS = (".pdf", ".png", ".svg")
@@ -109,12 +111,13 @@ def ridges(curves: dict[str, Foresight], file: Path) -> None:
     figure = Figure(figsize=(2.6 * len(curves), 5), layout="constrained")
     panels = figure.subplots(1, len(curves), sharey=True, squeeze=False)[0]
     for axes, (title, seen) in zip(panels, curves.items(), strict=True):
+        actions = np.linspace(-1.0, 1.0, seen.curves.shape[1])
         shown = range(0, len(seen.times), max(1, len(seen.times) // RIDGES))
         height = 2.5 * seen.times[-1] / len(shown)
         for k in reversed(shown):  # Later steps lie behind.
             base, colour = seen.times[k], "tab:green" if seen.right[k] else "tab:red"
-            axes.fill_between(GRID, base, base + height * seen.curves[k], color=colour, alpha=0.5, linewidth=0)
-            axes.plot(GRID, base + height * seen.curves[k], color="0.2", linewidth=0.4)
+            axes.fill_between(actions, base, base + height * seen.curves[k], color=colour, alpha=0.5, linewidth=0)
+            axes.plot(actions, base + height * seen.curves[k], color="0.2", linewidth=0.4)
             axes.plot([seen.episode.actions[k, 0]] * 2, [base, base + 0.5 * height], color="black", linewidth=1)
         axes.set_title(title, fontsize=8, wrap=True)
         axes.set(xlabel="action", xlim=(-1.0, 1.0))
