@@ -56,12 +56,13 @@ def build(into: Path) -> list[Path]:
     rows = leaderboard.table(records.results(into / RESULTS))
     made = [into / "table.csv", into / "README.md"]
     provenance.write_whole(made[0], lambda part: rows.to_csv(part, index=False, float_format="%.6g"))
-    _insert(made[1], "\n".join(_sections(rows)))
-    for reaches in rows["reaches"].unique():
-        curves = {label: found for (label, where), found in learning_curves(into / RESULTS).items() if where == reaches}
-        if curves:
-            made.append(into / f"curves-{reaches}.png")
-            figures.learning_curves(curves, rows[rows["reaches"] == reaches], made[-1])
+    curves: dict[str, dict[str, Curves]] = defaultdict(dict)
+    for (method, reaches), found in learning_curves(into / RESULTS).items():
+        curves[reaches][method] = found
+    _insert(made[1], "\n".join(_sections(rows, set(curves))))
+    for reaches, found in curves.items():
+        made.append(into / _picture(reaches))
+        figures.learning_curves(found, rows[rows["reaches"] == reaches], made[-1])
     return made
 
 
@@ -108,8 +109,16 @@ def _insert(file: Path, text: str) -> None:
     provenance.write_whole(file, lambda part: part.write_text(new, encoding="utf-8"))
 
 
-def _sections(rows: pd.DataFrame) -> Iterator[str]:
-    """The README's tables, as Markdown: for each source, scores on every split, then how episodes of `test` end."""
+def _picture(reaches: str) -> str:
+    """The file of a source's learning curves."""
+    return f"curves-{reaches}.png"
+
+
+def _sections(rows: pd.DataFrame, drawn: set[str]) -> Iterator[str]:
+    """The README's tables, as Markdown: for each source, scores on every split, then how episodes of `test` end.
+
+    Sources in `drawn` have a picture of learning curves.
+    """
     for reaches, group in rows.groupby("reaches", sort=False):
         names = [name for name in splits.NAMES if name in set(group["split"])]
         ranked = group[group["split"] == "test"]["method"].tolist()
@@ -119,6 +128,8 @@ def _sections(rows: pd.DataFrame) -> Iterator[str]:
         for method in ranked:
             own = group[group["method"] == method].set_index("split")
             yield _line([f"`{method}`", own["seeds"].iloc[0], *(_score(own, name) for name in names)])
+        if reaches in drawn:
+            yield f"\n![Learning curves on {reaches} reaches]({_picture(str(reaches))})"
         yield "\nHow episodes of `test` end [%] ([docs/diagnosis.md](../docs/diagnosis.md)); closing lag in seconds.\n"
         yield _line(["method", *CAUSES, "closing lag"])
         yield _line(["---", *["---:"] * (len(CAUSES) + 1)])
