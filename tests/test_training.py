@@ -68,9 +68,10 @@ def test_a_training_leaves_checkpoint_metrics_and_snapshots(tmp_path: Path):
         "toy-0.1", 3, [0, 3], 4, 80.0,
     )  # fmt: skip
     assert not (tmp_path / "a" / "journals").exists()
-    assert [part[:2] for part in told] == [(n, 5) for n in (0, 1, 2, 2, 3, 4, 4, 5, 5)]
+    assert [part[:2] for part in told] == [(n, 5) for n in (0, 1, 2, 2, 3, 4, 4, 5, 5, 5, 5)]
     assert told[0][2] == ""
-    assert told[-1][2].startswith("val ")
+    assert told[-3][2].startswith("val ")
+    assert [part[2] for part in told[-2:]] == [f"choosing between the 5 best of seed {seed}" for seed in SEEDS]
 
 
 def test_again_it_computes_nothing_and_changes_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
