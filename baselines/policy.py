@@ -6,15 +6,15 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-import torch
+from dextron_bench.exact import Perceptron
 from torch import Tensor
 from torch.nn.functional import softplus
 
-from baselines.networks import Stack
 from baselines.normalise import CLIP
 
 STATE = 48
 LOG_STD = (-20.0, 2.0)
+STEPS = 2**24  # Actions are whole multiples of its inverse: the last bits of tanh differ from machine to machine.
 
 
 def head(outputs: Tensor) -> tuple[Tensor, Tensor]:
@@ -39,13 +39,13 @@ def log_probability(raw: Tensor, log_std: Tensor, noise: Tensor) -> Tensor:
 
 
 class MeanAgent:
-    """Plays the tanh of the mean: the deterministic policy of one seed's weights."""
+    """Plays the tanh of the mean: the deterministic policy of one seed's weights, the same at any batch size."""
 
     def __init__(self, weights: Mapping[str, np.ndarray]) -> None:
         """Takes `mean` and `deviation` (48,) of states, and the policy's layers as `policy.0`, `policy.1`, ..."""
         self._mean, self._deviation = (np.asarray(weights[name], np.float64) for name in ("mean", "deviation"))
-        layers = [np.asarray(weights[f"policy.{i}"], np.float32)[None] for i in range(6)]
-        self._network = Stack([torch.tensor(layer) for layer in layers])
+        layers = [weights[f"policy.{i}"] for i in range(6)]
+        self._network = Perceptron(list(zip(layers[::2], layers[1::2], strict=True)))
 
     def reset(self, episodes: np.ndarray) -> None:
         """Has no memory."""
@@ -53,6 +53,4 @@ class MeanAgent:
     def act(self, states: np.ndarray) -> np.ndarray:
         """Closing speeds (N, 1) for states (N, 48)."""
         scaled = np.clip((states - self._mean) / self._deviation, -CLIP, CLIP)
-        with torch.inference_mode():
-            mean, _ = head(self._network(torch.tensor(scaled, dtype=torch.float32)[None]))
-            return mean.tanh()[0].double().numpy()
+        return np.rint(np.tanh(self._network(scaled)[:, :1]) * STEPS) / STEPS

@@ -91,10 +91,10 @@ def learning_curves(curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFra
         mean, colour = table.mean(axis=1), f"C{place}"
         axes.plot(table.index, mean, color=colour, label=f"{label} ({len(seeds)} seeds)", linewidth=1.5)
         axes.fill_between(table.index, table.min(axis=1), table.max(axis=1), color=colour, alpha=0.15, linewidth=0)
-    for place, row in enumerate(rows[rows["split"] == "test"].to_dict("records")):
-        if row["method"] not in curves:
-            style = ("--", ":", "-.", (0, (1, 3)))[place % 4]
-            axes.axhline(row["return"], color="0.4", linewidth=1, linestyle=style, label=f"{row['method']} (on test)")
+    steady = rows[(rows["split"] == "test") & ~rows["method"].isin(list(curves))]
+    for place, row in enumerate(steady.to_dict("records"), start=len(curves)):
+        style = ("--", ":", "-.")[place % 3]
+        axes.axhline(row["return"], color=f"C{place}", linewidth=1, linestyle=style, label=f"{row['method']} (on test)")
     axes.set(xlabel="epochs of 1,000 frames", ylabel="sum of rewards", ylim=(0.0, 20.5), xlim=(0.0, None))
     axes.set_title("Mean and range over seeds on 50 settings of val")
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)

@@ -14,7 +14,7 @@ from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine, Step
 from dextron_bench.world.setting import Setting, Source
 
-SLOTS = 256  # Episodes at once. Fixed, because a network's last bits may depend on the batch.
+SLOTS = 256  # Episodes at once. Fixed, because an entrant's last bits may depend on the batch (see `exact`).
 
 
 class Agent(Protocol):
