@@ -64,7 +64,7 @@ def claim(folder: Path, config: dict[str, Any]) -> None:
 
 
 def row(split: splits.Split, index: int, episode: Episode) -> dict[str, Any]:
-    """An episode's row of the table of episodes."""
+    """An episode's row of the table of episodes; with its actions it can be played again, bit for bit."""
     found = diagnosis.diagnose(episode, split.cases[index])
     return {
         "split": split.name,
@@ -79,6 +79,7 @@ def row(split: splits.Split, index: int, episode: Episode) -> dict[str, Any]:
         "failure": episode.failure,
         "cause": found.cause,
         "closing_lag": found.closing_lag,
+        "actions": episode.actions[:, 0],
     }
 
 

@@ -12,12 +12,15 @@ import numpy as np
 import pandas as pd
 import pytest
 import tiny
+from brief import SETTINGS, SOURCE
 
 from dextron_bench import provenance, recording, records, run, splits
 from dextron_bench.experts import ExpertAgent
 from dextron_bench.records import DamagedRun, RunMismatch
+from dextron_bench.replay import replay
 from dextron_bench.rollout import rollout
 from dextron_bench.run import Plan
+from dextron_bench.world.setting import from_frame
 
 PLAN = Plan("exp", "synthetic", ("val", "test"), seed=0)
 AGENT = """
@@ -120,6 +123,18 @@ def test_the_result_is_what_the_episodes_say(tmp_path: Path):
         assert found["digest"] == splits.load("synthetic", name).digest
         assert found["failed"] == 0
     assert episodes["success"].all()
+
+
+def test_its_actions_play_every_episode_again(tmp_path: Path):
+    rows = pd.read_parquet(play(tmp_path) / "episodes.parquet")
+    again = dict(replay(SOURCE, from_frame(rows), rows["actions"].tolist(), threads=1))
+    assert [again[k].score for k in range(len(rows))] == rows["score"].tolist()
+    assert [len(again[k].actions) for k in range(len(rows))] == rows["length"].tolist()
+
+
+def test_actions_that_end_before_the_episode_fail_it():
+    (_, found), (_, empty) = sorted(replay(SOURCE, [SETTINGS[0]] * 2, [np.zeros(3), np.zeros(0)], threads=1))
+    assert (found.failure, empty.failure) == ("action is nan at step 3", "action is nan at step 0")
 
 
 def test_a_recording_reads_back_as_the_episode(tmp_path: Path):

@@ -20,7 +20,8 @@ from dextron_bench.success.collection import POLICY, SOLVED, UNIFORM, BadCollect
 from dextron_bench.success.collection import file_of as block_file
 from dextron_bench.success.dataset import Dataset, EmptyDataset
 from dextron_bench.success.fit import MODEL, BadFit, Fit, fit
-from dextron_bench.success.network import GRID, BadModel, SuccessModel
+from dextron_bench.success.fit import network as fit_network
+from dextron_bench.success.network import GRID, SIZES, BadModel, MissingModel, SuccessModel, shipped
 
 TRAIN = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 SMALL = Collection("synthetic", block=5, policies=("nothing",))
@@ -119,38 +120,44 @@ def test_no_data_set_and_a_damaged_one_are_told(tmp_path: Path):
 # Model
 
 
-def made() -> SuccessModel:
+def arrays() -> dict[str, np.ndarray]:
     rng = np.random.default_rng(0)
-    return SuccessModel(rng.normal(size=48), rng.uniform(0.5, 2.0, 48), seed=3)
+    layers = {f"layer.{i}": rng.normal(size=shape) / shape[-1] ** 0.5 for i, shape in enumerate(SIZES)}
+    return layers | {"mean": rng.normal(size=48), "deviation": rng.uniform(0.5, 2.0, 48)}
 
 
-def test_a_curve_is_the_chance_of_each_action():
-    model, states = made(), np.random.default_rng(1).normal(size=(4, 48))
+def test_a_curve_is_the_chance_of_each_action_bit_for_bit():
+    model, states = SuccessModel(arrays()), np.random.default_rng(1).normal(size=(4, 48))
     curve = model.curve(states)
     assert curve.shape == (4, 51)
     for place in (0, 17, 50):
-        np.testing.assert_allclose(curve[:, place], model.chance(states, np.full(4, GRID[place])), atol=1e-6)
+        np.testing.assert_array_equal(curve[:, place], model.chance(states, np.full(4, GRID[place])))
+    np.testing.assert_array_equal(model.curve(states[2:3]), curve[2:3])
     np.testing.assert_allclose(GRID[[0, 1, 50]], [-1.0, -0.96, 1.0])
 
 
 def test_chances_are_a_softmax_of_two_classes_by_hand():
-    model = SuccessModel(np.zeros(48), np.ones(48))
-    with torch.no_grad():
-        for layer in model.layers:
-            layer.weight.zero_()
-            layer.bias.zero_()
-        model.layers[2].bias.copy_(torch.tensor([0.0, np.log(3.0)]))
+    still = {name: np.zeros_like(array) for name, array in arrays().items()}
+    model = SuccessModel(still | {"deviation": np.ones(48), "layer.5": np.array([0.0, np.log(3.0)])})
     np.testing.assert_allclose(model.chance(np.ones((2, 48)), np.zeros(2)), 0.75, rtol=1e-6)
 
 
-def test_a_model_comes_back_from_its_arrays():
-    model, states = made(), np.ones((2, 48))
-    again = SuccessModel.of(model.arrays())
-    np.testing.assert_array_equal(again.curve(states), model.curve(states))
-    with pytest.raises(BadModel, match="KeyError: 'mean'"):
-        SuccessModel.of({"layer.0": np.zeros(3)})
+def test_chances_are_those_of_the_network_that_was_trained():
+    network, rng = fit_network(np.random.default_rng(0)), np.random.default_rng(1)
+    layers = {f"layer.{i}": parameter.detach().numpy() for i, parameter in enumerate(network.parameters())}
+    states, actions = rng.normal(size=(30, 48)), rng.uniform(-1.0, 1.0, 30)
+    found = network(torch.tensor(np.c_[states, actions], dtype=torch.float32)).softmax(dim=1)[:, 1]
+    model = SuccessModel(layers | {"mean": np.zeros(48), "deviation": np.ones(48)})
+    np.testing.assert_allclose(model.chance(states, actions), found.detach().numpy(), atol=1e-6)
+
+
+def test_arrays_that_make_no_model_are_told():
+    with pytest.raises(BadModel, match=r"'layer.1' is not of shape \(256,\)"):
+        SuccessModel(arrays() | {"layer.1": np.zeros(3)})
     with pytest.raises(BadModel, match="not finite"):
-        SuccessModel.of(model.arrays() | {"mean": np.full(48, np.nan)})
+        SuccessModel(arrays() | {"mean": np.full(48, np.nan)})
+    with pytest.raises(MissingModel, match="no success model ships for minjerk"):
+        shipped("minjerk")
 
 
 # Training

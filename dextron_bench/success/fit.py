@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from dextron_bench import tensors
 from dextron_bench.records import RunMismatch
 from dextron_bench.success.dataset import Dataset
-from dextron_bench.success.network import SuccessModel
+from dextron_bench.success.network import CLIP, SIZES, SuccessModel
 
 STATE = "fit.safetensors"  # In the folder of a data set: the training as it stands.
 MODEL = "model.safetensors"
@@ -62,13 +62,28 @@ def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note:
         lesson.advance()
         tensors.write(file, lesson.state(), lesson.about())
     report(lesson.epoch, settings.epochs, lesson.note())
-    tensors.write(folder / MODEL, lesson.model.arrays(), lesson.about())
-    return lesson.model
+    tensors.write(folder / MODEL, lesson.arrays(), lesson.about())
+    return SuccessModel(lesson.arrays())
 
 
 def curve(folder: Path) -> list[dict[str, float]]:
     """The learning curve of the model in a folder: losses and accuracies on both halves after each epoch."""
     return tensors.read_about(folder / MODEL)["curve"]
+
+
+def network(rng: np.random.Generator) -> nn.Sequential:
+    """New layers, drawn uniformly as PyTorch draws them."""
+    (_, wide), (hidden,), _, _, (classes, _), _ = SIZES
+    made = nn.Sequential(
+        nn.Linear(wide, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.ReLU(), nn.Linear(hidden, classes)
+    )
+    with torch.no_grad():
+        for layer in made:
+            if isinstance(layer, nn.Linear):
+                bound = layer.in_features**-0.5
+                for parameter in (layer.weight, layer.bias):
+                    parameter.copy_(torch.tensor(rng.uniform(-bound, bound, tuple(parameter.shape))))
+    return made
 
 
 class _Lesson:
@@ -79,9 +94,10 @@ class _Lesson:
         self._data, self._held = Dataset(folder), Dataset(folder, test=True)
         self.epoch, self.curve = 0, list[dict[str, float]]()
         states, _, _ = self._data.take(self._rng(1).integers(len(self._data), size=SCALED_BY))
-        deviation = np.sqrt(states.var(axis=0, dtype=np.float64) + 1e-8)
-        self.model = SuccessModel(states.mean(axis=0, dtype=np.float64), deviation, settings.seed)
-        self._parameters = list(self.model.network.parameters())
+        self._mean = states.mean(axis=0, dtype=np.float64)
+        self._deviation = np.sqrt(states.var(axis=0, dtype=np.float64) + 1e-8)
+        self._network = network(self._rng(0))
+        self._parameters = list(self._network.parameters())
         self._optimiser = torch.optim.Adam(self._parameters, lr=settings.learning_rate, fused=True)
         self._loss = nn.CrossEntropyLoss()
 
@@ -94,7 +110,7 @@ class _Lesson:
         for _ in range(settings.updates):
             states, actions, outcomes = self._data.take(rng.integers(len(self._data), size=settings.batch))
             wanted = torch.tensor(outcomes)
-            found = self.model.network(self.model.inputs(states, actions))
+            found = self._network(self._inputs(states, actions))
             loss = self._loss(found, wanted)
             self._optimiser.zero_grad(set_to_none=True)
             loss.backward()
@@ -107,10 +123,15 @@ class _Lesson:
     def _test(self) -> dict[str, float]:
         states, actions, outcomes = self._held.take(self._rng(3).integers(len(self._held), size=TESTED))
         with torch.inference_mode():
-            found = self.model.network(self.model.inputs(states, actions))
+            found = self._network(self._inputs(states, actions))
             wanted = torch.tensor(outcomes)
             right = (found.argmax(dim=1) == wanted).double().mean().item()
             return {"test_loss": self._loss(found, wanted).item(), "test_accuracy": right}
+
+    def _inputs(self, states: np.ndarray, actions: np.ndarray) -> Tensor:
+        """What the network takes, (B, 49), for states (B, 48) and actions (B,)."""
+        scaled = np.clip((states - self._mean) / self._deviation, -CLIP, CLIP)
+        return torch.tensor(np.concatenate([scaled, actions[:, None]], axis=1), dtype=torch.float32)
 
     def note(self) -> str:
         """How it goes."""
@@ -120,9 +141,14 @@ class _Lesson:
         """What goes with the arrays."""
         return {"fit": asdict(self._settings), "rows": len(self._data), "epoch": self.epoch, "curve": self.curve}
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Copies of what the model is made of."""
+        found = {f"layer.{i}": parameter.detach().numpy().copy() for i, parameter in enumerate(self._parameters)}
+        return found | {"mean": self._mean, "deviation": self._deviation}
+
     def state(self) -> dict[str, np.ndarray]:
         """The model and the optimiser's memory."""
-        found = self.model.arrays()
+        found = self.arrays()
         for i, parameter in enumerate(self._parameters):
             memory = self._optimiser.state[parameter]
             found |= {f"adam.{i}.{name}": memory[name].numpy().copy() for name in MEMORY}

@@ -3,81 +3,76 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
+from importlib.resources import as_file, files
 
 import numpy as np
-import torch
-from torch import Tensor, nn
 
+from dextron_bench import tensors
+from dextron_bench.exact import Perceptron
 from dextron_bench.world import model
 
 HIDDEN = 256
+SIZES = ((HIDDEN, model.STATE + 1), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (2, HIDDEN), (2,))  # Of its layers.
 GRID = np.linspace(-1.0, 1.0, 51)  # The actions of a curve (paper, fig. 5).
 CLIP = 10.0  # Scaled states are clipped to this far from 0.
+STEPS = 2**24  # Chances are whole multiples of its inverse: the last bits of exp differ from machine to machine.
 
 
 class BadModel(ValueError):
     """Arrays that make no success model."""
 
 
+class MissingModel(LookupError):
+    """A source of reaches for which no success model ships."""
+
+
 class SuccessModel:
-    """A perceptron of three layers and two classes; states scaled by a fixed mean and deviation (48,)."""
+    """A perceptron of three layers and two classes on scaled states; its chances are the same at any batch size."""
 
-    def __init__(self, mean: np.ndarray, deviation: np.ndarray, seed: int = 0) -> None:
-        """New networks, drawn from the seed."""
-        sizes = (model.STATE + 1, HIDDEN, HIDDEN, 2)
-        rng = np.random.default_rng([seed, 0])
-        self.mean, self.deviation = np.asarray(mean, np.float32), np.asarray(deviation, np.float32)
-        self.network = nn.Sequential(
-            nn.Linear(sizes[0], sizes[1]), nn.ReLU(), nn.Linear(sizes[1], sizes[2]), nn.ReLU(), nn.Linear(*sizes[2:])
-        )
-        with torch.no_grad():
-            for layer in self.layers:
-                bound = layer.in_features**-0.5
-                for parameter in (layer.weight, layer.bias):
-                    parameter.copy_(torch.tensor(rng.uniform(-bound, bound, tuple(parameter.shape))))
+    def __init__(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Takes `mean` and `deviation` (48,) of states, and weights and biases as `layer.0` to `layer.5`.
 
-    @property
-    def layers(self) -> list[nn.Linear]:
-        """The linear layers in order."""
-        return [layer for layer in self.network if isinstance(layer, nn.Linear)]
-
-    def inputs(self, states: np.ndarray, actions: np.ndarray) -> Tensor:
-        """What the network takes, (N, 49), for states (N, 48) and actions (N,)."""
-        scaled = np.clip((states - self.mean) / self.deviation, -CLIP, CLIP)
-        return torch.tensor(np.concatenate([scaled, actions[:, None]], axis=1), dtype=torch.float32)
+        Raises BadModel.
+        """
+        names = [f"layer.{i}" for i in range(len(SIZES))]
+        wanted = dict(zip(names, SIZES, strict=True)) | dict.fromkeys(("mean", "deviation"), (model.STATE,))
+        for name, shape in wanted.items():
+            if name not in arrays or np.shape(arrays[name]) != shape:
+                raise BadModel(f"these arrays are no success model: {name!r} is not of shape {shape}")
+            if not np.isfinite(arrays[name]).all():
+                raise BadModel(f"a success model with numbers in {name!r} that are not finite")
+        self._mean, self._deviation = (np.asarray(arrays[name], np.float64) for name in ("mean", "deviation"))
+        first, bias, *rest = (np.asarray(arrays[name], np.float64).T for name in names)
+        self._of_states, self._of_action = Perceptron([(first[:-1], bias)]), first[-1]
+        self._rest = Perceptron(list(zip(rest[::2], rest[1::2], strict=True)))
 
     def chance(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """The predicted chance of success, (N,), of actions (N,) in states (N, 48)."""
-        with torch.inference_mode():
-            return self.network(self.inputs(states, actions)).softmax(dim=1)[:, 1].double().numpy()
+        return self._chances(self._seen(states) + actions[:, None] * self._of_action)
 
     def curve(self, states: np.ndarray) -> np.ndarray:
-        """The chances (N, 51) of the actions of GRID in states (N, 48).
+        """The chances (N, 51) of the actions of GRID in states (N, 48), as `chance` gives them."""
+        hidden = self._seen(states)[:, None] + GRID[:, None] * self._of_action
+        return self._chances(hidden.reshape(-1, HIDDEN)).reshape(-1, len(GRID))
 
-        The first layer is linear in the action, so that the states pass it once.
-        """
-        first, second, last = self.layers
-        with torch.inference_mode():
-            of_states = first(self.inputs(states, np.zeros(len(states))))
-            grid = torch.tensor(GRID, dtype=torch.float32)[None, :, None]
-            hidden = (of_states[:, None] + grid * first.weight[:, -1]).relu_()
-            return last(second(hidden).relu_()).softmax(dim=2)[..., 1].double().numpy()
+    def _seen(self, states: np.ndarray) -> np.ndarray:
+        """What the first layer makes of states (N, 48), without an action: (N, HIDDEN)."""
+        return self._of_states(np.clip((states - self._mean) / self._deviation, -CLIP, CLIP))
 
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Copies of all that the model is."""
-        found = {f"layer.{i}": p.detach().numpy().copy() for i, p in enumerate(self.network.parameters())}
-        return found | {"mean": self.mean.copy(), "deviation": self.deviation.copy()}
+    def _chances(self, hidden: np.ndarray) -> np.ndarray:
+        against, in_favour = self._rest(np.maximum(hidden, 0.0)).T
+        odds = np.exp(np.clip(against - in_favour, -50.0, 50.0))
+        return np.rint(STEPS / (1.0 + odds)) / STEPS
 
-    @classmethod
-    def of(cls, arrays: Mapping[str, np.ndarray]) -> SuccessModel:
-        """The model that gave these arrays; raises BadModel."""
-        try:
-            made = cls(arrays["mean"], arrays["deviation"])
-            with torch.no_grad():
-                for i, parameter in enumerate(made.network.parameters()):
-                    parameter.copy_(torch.tensor(arrays[f"layer.{i}"]))
-        except (KeyError, RuntimeError, TypeError) as error:
-            raise BadModel(f"these arrays are no success model ({type(error).__name__}: {error})") from error
-        if not all(np.isfinite(array).all() for array in arrays.values()):
-            raise BadModel("a success model with numbers that are not finite")
-        return made
+
+@cache
+def shipped(reaches: str) -> SuccessModel:
+    """The model that ships for a source of reaches; raises MissingModel."""
+    place = files("dextron_bench") / "data" / f"success-{reaches}.safetensors"
+    if not place.is_file():
+        raise MissingModel(
+            f"no success model ships for {reaches} reaches; train one with `dextron-bench success train`"
+        )
+    with as_file(place) as file:
+        return SuccessModel(tensors.read(file))

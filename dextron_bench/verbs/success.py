@@ -125,7 +125,7 @@ class Eval:
         from dextron_bench.world.sources import open_source
 
         file = self.model or folder_of(self.runs, self.reaches, 0) / fit.MODEL
-        model, source = SuccessModel.of(tensors.read(file)), open_source(self.reaches)
+        model, source = SuccessModel(tensors.read(file)), open_source(self.reaches)
         players = {"experts": None} | {str(policy): weights.own(policy) for policy in self.policies}
         rows = []
         for name in self.split or splits.evaluated(self.reaches):
@@ -174,7 +174,7 @@ class Explain:
         from dextron_bench.world.sources import open_source
 
         file = self.model or folder_of(self.runs, self.reaches, 0) / fit.MODEL
-        model, source = SuccessModel.of(tensors.read(file)), open_source(self.reaches)
+        model, source = SuccessModel(tensors.read(file)), open_source(self.reaches)
         cases = splits.load(self.reaches, self.split).cases[: self.rows]
         players = {explanation.EXPERT: ExpertAgent()} | {str(policy): weights.own(policy) for policy in self.policies}
         found = explanation.choose(
