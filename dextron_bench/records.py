@@ -11,7 +11,8 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench import diagnosis, methods, provenance, splits
-from dextron_bench.rollout import Episode
+from dextron_bench.rollout import Case, Episode
+from dextron_bench.success import insight, network
 from dextron_bench.world import model, setting
 
 CONFIG = "config.json"
@@ -104,19 +105,34 @@ def store(folder: Path, episodes: pd.DataFrame) -> None:
 def unrecorded(folder: Path, done: pd.DataFrame, record: int) -> bool:
     """Whether a recording is missing; an episode that failed before its first step has none."""
     wanted = done[(done["row"] < record) & (done["length"] > 0)]
-    places = (_recording(folder, split, row) for split, row in zip(wanted["split"], wanted["row"], strict=True))
+    places = (recording_file(folder, split, row) for split, row in zip(wanted["split"], wanted["row"], strict=True))
     return not all(place.exists() for place in places)
 
 
 def record(
     folder: Path, source: setting.Source, split: splits.Split, index: int, episode: Episode, about: dict[str, Any]
 ) -> None:
-    """Writes an episode's recording, with whose it is in `about`."""
+    """Writes an episode's recording: whose it is, in `about`, and what the success model that ships thinks of it."""
     from dextron_bench import recording
 
     properties = {**about, "split": split.name, "split_digest": split.digest, "row": index}
     properties["physics"] = model.mjcf_hash()
-    recording.write(_recording(folder, split.name, index), episode, source.path(episode.setting), properties)
+    file, path = recording_file(folder, split.name, index), source.path(episode.setting)
+    recording.write(file, episode, path, properties, _insight(source, split.cases[index], episode))
+
+
+def recording_file(folder: Path, split: str, index: int) -> Path:
+    """Where the recording of a split's row lies in a run's folder."""
+    return folder / "recordings" / f"{split}-{index:04d}.rrd"
+
+
+def _insight(source: setting.Source, case: Case, episode: Episode) -> insight.Insight | None:
+    """None where no success model ships for the source."""
+    try:
+        judge = network.shipped(source.name)
+    except network.MissingModel:
+        return None
+    return insight.look(judge, source, case, episode)
 
 
 def conclude(folder: Path, episodes: pd.DataFrame, about: dict[str, Any]) -> None:
@@ -161,7 +177,3 @@ def read_json(file: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise DamagedRun(file, "it holds no JSON object")
     return found
-
-
-def _recording(folder: Path, split: str, index: int) -> Path:
-    return folder / "recordings" / f"{split}-{index:04d}.rrd"

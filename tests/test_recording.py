@@ -127,7 +127,7 @@ def test_what_is_no_recording_is_named(file: Path) -> None:
 
 
 def test_a_recording_of_something_else_is_named(file: Path) -> None:
-    archive._save(file, layout.lines(), "other")
+    archive._save(file, layout.lines(), "other", layout.blueprint())
     with pytest.raises(recording.BrokenRecording, match="no digest"):
         recording.read(file)
 
@@ -221,7 +221,7 @@ def test_capsules_lie_where_the_physics_has_them() -> None:
 
 def test_bodies_move_as_the_states_say() -> None:
     played = episode(4)
-    positions, quaternions = scene.poses(played.states)
+    positions, quaternions, _ = scene.poses(played.states)
     bottle, palm = model.load().body("bottle").id, model.load().body("palm").id
     np.testing.assert_array_equal(positions[:, bottle], played.states[:, :3])
     np.testing.assert_array_equal(positions[:, palm], played.states[:, model.PALM_POSITION])

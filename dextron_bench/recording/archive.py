@@ -17,12 +17,14 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import rerun as rr
+import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 from rerun_bindings import flush_and_cleanup_orphaned_recordings
 
-from dextron_bench.recording import layout, scene
+from dextron_bench.recording import foresight, layout, scene
 from dextron_bench.recording.digest import digest, lines
 from dextron_bench.rollout import Episode
+from dextron_bench.success.insight import Insight
 from dextron_bench.world import model, reach
 from dextron_bench.world.setting import Setting
 
@@ -55,13 +57,19 @@ class UnwritableRecording(OSError):
         super().__init__(f"cannot write recording {file}: {why}")
 
 
-def write(file: Path, episode: Episode, path: reach.Path, properties: Mapping[str, Value]) -> str:
+def write(
+    file: Path, episode: Episode, path: reach.Path, properties: Mapping[str, Value], insight: Insight | None = None
+) -> str:
     """Writes an episode that followed `path` to `file`, whole or not at all; returns the file's SHA-256.
+
+    With `insight` it also shows what the success model thinks at each step.
 
     Raises UnwritableRecording, and ValueError where the arrays make no episode.
     """
     rr.set_strict_mode(True)
     chunks = [*_chunks(episode, properties), *scene.chunks(episode.states, path)]
+    if insight:
+        chunks += [*foresight.looks(), *foresight.chunks(insight, episode.actions, episode.success)]
     props, told = _props()
     identity = digest([*told, *lines(chunks)])
     chunks += [*props, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
@@ -69,7 +77,7 @@ def write(file: Path, episode: Episode, path: reach.Path, properties: Mapping[st
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         temporary.touch()
-        _save(temporary, chunks, identity)
+        _save(temporary, chunks, identity, layout.blueprint(insight is not None))
         sha256 = _seal(temporary)
         os.replace(temporary, file)
     except (OSError, RuntimeError) as error:
@@ -132,13 +140,13 @@ def _values(properties: Mapping[str, Value]) -> dict[str, pa.Array]:
     return {name: pa.array([value]) for name, value in properties.items()}
 
 
-def _save(file: Path, chunks: Iterable[Chunk], identity: str) -> None:
+def _save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> None:
     """Writes chunks and blueprint; raises RuntimeError where Rerun cannot or, switched off, would not."""
     recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
     try:
         if not rr.is_enabled(recording):
             raise RuntimeError("Rerun is switched off by RERUN in the environment; unset it")
-        recording.save(file, default_blueprint=layout.blueprint())
+        recording.save(file, default_blueprint=blueprint)
         recording.send_chunks(chunks)
         recording.disconnect()
     finally:

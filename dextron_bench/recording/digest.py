@@ -35,6 +35,13 @@ def _pieces(column: pa.Array) -> Iterable[bytes | memoryview]:
         yield from _pieces(column.flatten())
     elif pa.types.is_fixed_size_list(kind):
         yield from _pieces(column.flatten())
+    elif pa.types.is_struct(kind):
+        for part in column.flatten():
+            yield from _pieces(part)
+    elif pa.types.is_union(kind):
+        yield column.type_codes.to_numpy().tobytes()
+        for place in range(kind.num_fields):
+            yield from _pieces(column.field(place))
     elif column.null_count == 0 and pa.types.is_primitive(kind) and kind.bit_width >= 8:
         width = kind.bit_width // 8
         yield memoryview(column.buffers()[1])[column.offset * width : (column.offset + len(column)) * width]

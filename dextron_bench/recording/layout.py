@@ -10,7 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk
 
-from dextron_bench.recording import scene
+from dextron_bench.recording import foresight, scene
 from dextron_bench.rollout import Episode
 from dextron_bench.world import task
 
@@ -24,12 +24,17 @@ LINES = {  # Entity of plotted lines, their names and colours.
         f"lifted from {task.LIFTED} m": (140, 140, 140),
     },
     "/episode/rewards": {"reward": (255, 210, 80)},
+    "/signals/expert": {"expert's action": (120, 200, 120)},
+    "/success/chance": {"predicted success": (90, 150, 230), "threshold": (140, 140, 140)},
 }
 PLOTS = {  # Title of each plot, its lines, their range and where they are named.
     "Action and hand closure": (("/episode/actions", "/signals/closure"), (-1.1, 1.1), rrb.Corner2D.RightBottom),
     "Palm's distance, bottle's height [m]": (("/signals/metres",), (0.0, 0.7), rrb.Corner2D.RightTop),
     "Reward": (("/episode/rewards",), (-0.1, 1.1), rrb.Corner2D.LeftTop),
 }
+ADDED = {"Action and hand closure": ("/signals/expert",), "Reward": ("/success/chance",)}  # Where success is foretold.
+FORETOLD = {"Reward": "Reward, predicted success"}
+DIGEST = 64  # Characters of a hash, of which the card shows eight.
 BACKGROUND = (33, 38, 45)
 
 
@@ -78,16 +83,36 @@ def card(episode: Episode, properties: Mapping[str, object]) -> Chunk:
 
 def _cell(value: object) -> str:
     text = f"{value:.4g}" if isinstance(value, float) else str(value)
+    text = text[:8] if len(text) == DIGEST else text
     return text.replace("|", "/")
 
 
 @cache
-def blueprint() -> rrb.Blueprint:
-    """3D view on the left; card and plots on the right; nothing else open."""
+def blueprint(foretold: bool = False) -> rrb.Blueprint:
+    """3D view on the left; card and plots on the right; where success is foretold its curve and its ridge plot too."""
+    text = rrb.TextDocumentView(origin="/card", name="Episode")
+    plots = [_plot(name, foretold) for name in PLOTS]
+    told = rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3])
+    if foretold:
+        seen = rrb.Vertical(_space(), _bars(), row_shares=[5, 2])
+        content = rrb.Horizontal(seen, told, _ridge(), column_shares=[9, 7, 4])
+    else:
+        content = rrb.Horizontal(_space(), told, column_shares=[3, 2])
+    return rrb.Blueprint(
+        content,
+        rrb.TimePanel(timeline="step", fps=50.0, play_state="paused", state="collapsed"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _space() -> rrb.Spatial3DView:
     eye = rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=EYE, look_target=TARGET, eye_up=(0, 0, 1))
     start, now = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
     trail = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=now) for line in ("step", "seconds")])
-    space = rrb.Spatial3DView(
+    return rrb.Spatial3DView(
         origin="/world",
         name="Grasp",
         eye_controls=eye,
@@ -95,21 +120,31 @@ def blueprint() -> rrb.Blueprint:
         background=rrb.Background(color=BACKGROUND),
         overrides={scene.TRACE: trail},
     )
-    plots = [
-        rrb.TimeSeriesView(
-            name=name,
-            contents=list(entities),
-            axis_y=rrb.ScalarAxis(range=span, zoom_lock=True),
-            plot_legend=rrb.PlotLegend(corner=corner),
-        )
-        for name, (entities, span, corner) in PLOTS.items()
-    ]
-    text = rrb.TextDocumentView(origin="/card", name="Episode")
-    return rrb.Blueprint(
-        rrb.Horizontal(space, rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3]), column_shares=[3, 2]),
-        rrb.TimePanel(timeline="step", fps=50.0, play_state="paused", state="collapsed"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
-        auto_views=False,
-        auto_layout=False,
+
+
+def _plot(name: str, foretold: bool) -> rrb.TimeSeriesView:
+    entities, span, corner = PLOTS[name]
+    return rrb.TimeSeriesView(
+        name=name if not foretold else FORETOLD.get(name, name),
+        contents=[*entities, *(ADDED.get(name, ()) if foretold else ())],
+        axis_y=rrb.ScalarAxis(range=span, zoom_lock=True),
+        plot_legend=rrb.PlotLegend(corner=corner),
+    )
+
+
+def _bars() -> rrb.BarChartView:
+    contents = [f"/success/{name}" for name in ("curve", "chosen", "scale")]
+    legend = rrb.PlotLegend(visible=False)
+    return rrb.BarChartView(
+        name="Chance of success by action, from open to close", contents=contents, plot_legend=legend
+    )
+
+
+def _ridge() -> rrb.Spatial2DView:
+    bounds = rrb.VisualBounds2D(x_range=(-1.25, 1.25), y_range=(-foresight.HEIGHT - 0.6, 0.4))
+    return rrb.Spatial2DView(
+        origin="/ridge",
+        name="Chances, upward",
+        background=rrb.Background(color=BACKGROUND),
+        visual_bounds=bounds,
     )

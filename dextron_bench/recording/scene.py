@@ -15,7 +15,9 @@ from dextron_bench.world import dressing, model, reach, rotation, task
 
 XYZW = [1, 2, 3, 0]  # Rerun puts the scalar part of a quaternion last.
 TRACE = "/world/trace"  # One leg a step; the layout shows those up to now.
+CONTACTS = "/world/contacts"
 PATH_COLOUR, TRACE_COLOUR, CENTRE_COLOUR = (130, 180, 255), (255, 190, 60), (255, 90, 60)
+CONTACT_COLOUR = (230, 60, 200)
 
 
 def timelines(first: int, last: int) -> list[rr.TimeColumn]:
@@ -35,10 +37,12 @@ def static(entity: str, *contents: rr.AsComponents) -> Chunk:
 def chunks(states: np.ndarray, path: reach.Path) -> Iterable[Chunk]:
     """Everything in the 3D view for states (T, 48) of an episode along `path`."""
     when = timelines(0, len(states) - 1)
-    positions, quaternions = poses(states)
+    positions, quaternions, touched = poses(states)
     for body in range(1, positions.shape[1]):
         moves = rr.Transform3D.columns(translation=positions[:, body], quaternion=quaternions[:, body][:, XYZW])
         yield Chunk.from_columns(_entity(body), when, moves)
+    points = rr.Points3D.columns(positions=np.concatenate(touched)).partition([len(each) for each in touched])
+    yield Chunk.from_columns(CONTACTS, when, points)
     centre = task.palm_centre(states)
     yield Chunk.from_columns("/world/palm_centre", when, rr.Points3D.columns(positions=centre))
     legs = np.stack([centre[:-1], centre[1:]], axis=1)
@@ -47,17 +51,26 @@ def chunks(states: np.ndarray, path: reach.Path) -> Iterable[Chunk]:
     yield static("/world/path", rr.LineStrips3D([planned], radii=[0.0012], colors=[PATH_COLOUR]))
 
 
-def poses(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World positions [m] (T, B, 3) and quaternions wxyz (T, B, 4) of every body but the carrier, in states (T, 48)."""
+def poses(states: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Where everything is in states (T, 48).
+
+    World positions [m] (T, B, 3) and quaternions wxyz (T, B, 4) of every body but the carrier, and for each state the
+    points [m] (C, 3) where the hand touches the bottle.
+    """
     physics = model.load()
     data = mujoco.MjData(physics)
-    bodies = physics.nbody - 1
+    bodies, bottle = physics.nbody - 1, physics.body("bottle").id
     positions, quaternions = np.empty((len(states), bodies, 3)), np.empty((len(states), bodies, 4))
+    touched = []
     for step, qpos in enumerate(states[:, : physics.nq]):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(physics, data)
+        mujoco.mj_collision(physics, data)
         positions[step], quaternions[step] = data.xpos[:bodies], data.xquat[:bodies]
-    return positions, quaternions
+        pairs = physics.geom_bodyid[data.contact.geom]  # (C, 2); body 0 has the table.
+        held = (pairs == bottle).any(axis=1) & (pairs != 0).all(axis=1) & (data.contact.dist < 0.0)
+        touched.append(data.contact.pos[held])
+    return positions, quaternions, touched
 
 
 def _entity(body: int) -> str:
@@ -70,6 +83,7 @@ def props() -> list[Chunk]:
     drawn = dressing.dressed()
     kept = [static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)]
     kept.append(static("/world/palm_centre", rr.Points3D.from_fields(radii=[0.005], colors=[CENTRE_COLOUR])))
+    kept.append(static(CONTACTS, rr.Points3D.from_fields(radii=[0.004], colors=[CONTACT_COLOUR])))
     kept.append(static(TRACE, rr.LineStrips3D.from_fields(radii=[0.002], colors=[TRACE_COLOUR])))
     groups: dict[int, dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
     for geom in np.flatnonzero(drawn.geom_group == dressing.SHOWN):

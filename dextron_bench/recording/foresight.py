@@ -1,0 +1,106 @@
+"""What the success model thinks while an episode runs: a bar chart at the cursor, and a ridge for all its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from rerun.chunk import Chunk
+from rerun.encodings import TensorDataBatch
+
+from dextron_bench.recording import scene
+from dextron_bench.success.insight import Insight
+
+RIDGES = 40  # Curves of the ridge plot, about.
+WIDTH, HEIGHT, RISE = 1.0, 5.0, 0.4  # Half the ridge plot's width, its height, and that of a curve of chance 1.
+RIGHT, WRONG, NOW, TICK = (90, 210, 140), (255, 90, 60), (255, 255, 255), (255, 190, 60)
+BARS, FRAME = (90, 150, 230), (150, 155, 165)
+THRESHOLD = 0.5  # A chance above it foretells success.
+
+
+def chunks(insight: Insight, actions: np.ndarray, success: bool) -> Iterable[Chunk]:
+    """All of it, for the actions (T, 1) that were taken and the outcome."""
+    steps = len(insight.chances)
+    when = scene.timelines(0, steps - 1)
+    foretold = np.stack([insight.chances, np.full(steps, THRESHOLD)], axis=1)
+    yield Chunk.from_columns("/success/chance", when, rr.Scalars.columns(scalars=foretold))
+    yield Chunk.from_columns("/signals/expert", when, rr.Scalars.columns(scalars=insight.experts))
+    yield Chunk.from_columns("/success/curve", when, rr.BarChart.columns(values=_tensors(insight.curves)))
+    chosen = rr.BarChart.columns(values=_tensors(insight.chances[:, None]), abscissa=_tensors(actions))
+    yield Chunk.from_columns("/success/chosen", when, chosen)
+    yield from _ridge(insight, actions[:, 0], success)
+
+
+def looks() -> list[Chunk]:
+    """What is the same in every episode: colours, the bars' places, and two thin bars of height 1 as their scale."""
+    grid, ends = np.linspace(-1.0, 1.0, 51), [-1.1, 1.1]
+    return [
+        _look("/success/curve", rr.BarChart(grid, abscissa=grid, widths=np.full(51, 0.036), color=BARS)),
+        _look("/success/chosen", rr.BarChart([0.0], widths=[0.03], color=TICK), "abscissa"),
+        scene.static("/ridge/now", rr.LineStrips2D.from_fields(colors=[NOW], radii=[0.008])),
+        scene.static("/success/scale", rr.BarChart([1.0, 1.0], abscissa=ends, widths=[0.02, 0.02], color=FRAME)),
+    ]
+
+
+def _look(entity: str, bars: rr.BarChart, *changing: str) -> Chunk:
+    """What of a bar chart is the same at every step: all but its values, which Rerun wants to see first."""
+    left_out = [f"BarChart:{name}" for name in ("values", *changing)]
+    batches = [batch for batch in bars.as_component_batches() if batch.component_descriptor().component not in left_out]
+    return Chunk.from_columns(entity, [], [batch.partition([len(batch.as_arrow_array())]) for batch in batches])
+
+
+def _ridge(insight: Insight, actions: np.ndarray, success: bool) -> Iterable[Chunk]:
+    """Curves one above the other, later ones higher; green where the outcome is foretold, red where it is not."""
+    steps, grid = len(actions), np.linspace(-WIDTH, WIDTH, insight.curves.shape[1])
+    base = -HEIGHT * np.arange(steps) / max(steps - 1, 1)  # The view's y goes down.
+    strips = np.stack([np.broadcast_to(grid, insight.curves.shape), base[:, None] - RISE * insight.curves], axis=2)
+    strips = strips.astype(np.float32)
+    shown = np.arange(0, steps, max(1, steps // RIDGES))
+    right = (insight.chances[shown] > THRESHOLD) == success
+    colours = np.where(right[:, None], RIGHT, WRONG).astype(np.uint8)
+    yield scene.static("/ridge/curves", rr.LineStrips2D(strips[shown], colors=colours, radii=[0.008]))
+    ticks = np.stack([actions, base, actions, base - RISE / 2], axis=1).reshape(-1, 2, 2).astype(np.float32)
+    yield scene.static("/ridge/actions", rr.LineStrips2D(ticks[shown], colors=[TICK], radii=[0.012]))
+    yield scene.static("/ridge/axis", *_axis(insight.duration, steps))
+    when = scene.timelines(0, steps - 1)
+    now = np.stack([[[-1.1 * WIDTH, y], [1.1 * WIDTH, y]] for y in base]).astype(np.float32)
+    yield Chunk.from_columns("/ridge/now", when, rr.LineStrips2D.columns(strips=now))
+
+
+def _axis(duration: float, steps: int) -> tuple[rr.LineStrips2D, rr.Points2D]:
+    """The end of the reach, and what the sides and ends of the plot are."""
+    over = -HEIGHT * duration / max(steps - 1, 1)
+    places = [[-WIDTH, 0.15], [0.0, 0.15], [WIDTH, 0.15]]
+    labels = ["open", "action", "close"]
+    if duration < steps:
+        places, labels = [*places, [-0.6 * WIDTH, over]], [*labels, "reach ends"]
+    line = [[[-WIDTH, over], [WIDTH, over]]] if duration < steps else []
+    marks = rr.Points2D(places, labels=labels, radii=[0.001], colors=[FRAME], show_labels=True)
+    return rr.LineStrips2D(line, colors=[FRAME], radii=[0.006]), marks
+
+
+def _tensors(rows: np.ndarray) -> pa.Array:
+    """One Arrow tensor (A,) for each row of (T, A); Rerun itself makes no batches of tensors."""
+    kind, count = TensorDataBatch._ARROW_DATATYPE, len(rows)
+    assert kind is not None
+    union = kind.field("buffer").type
+    fields = [union.field(i) for i in range(union.num_fields)]
+    place = [field.name for field in fields].index("F32")
+    children = [pa.array([], field.type) for field in fields]
+    children[place] = _lists(fields[place].type, pa.array(rows.astype(np.float32).ravel()), count)
+    codes, offsets = np.full(count, place, np.int8), np.arange(count, dtype=np.int32)
+    held = [None, pa.py_buffer(codes), pa.py_buffer(offsets)]
+    columns = [
+        _lists(kind.field("shape").type, pa.array(np.full(count, rows.shape[1], np.uint64)), count),
+        _lists(kind.field("names").type, pa.array([], pa.string()), count),
+        pa.Array.from_buffers(union, count, held, children=children),
+    ]
+    return pa.StructArray.from_arrays(columns, fields=[kind.field(i) for i in range(kind.num_fields)])
+
+
+def _lists(kind: pa.DataType, values: pa.Array, count: int) -> pa.Array:
+    """Values cut into so many lists of equal length."""
+    offsets = pa.array(np.arange(count + 1, dtype=np.int32) * (len(values) // count))
+    return pa.Array.from_buffers(kind, count, [None, offsets.buffers()[1]], children=[values])
