@@ -5,17 +5,22 @@ The only package that talks to Rerun.
 
 from dextron_bench.recording.archive import BrokenRecording, Recorded, UnwritableRecording, Value, read, write
 from dextron_bench.recording.probe import probe
+from dextron_bench.recording.properties import ReaderError, Summary, read_safely, summarise
 from dextron_bench.recording.viewer import ViewerError, screenshots, view
 
 __all__ = [
     "BrokenRecording",
+    "ReaderError",
     "Recorded",
+    "Summary",
     "UnwritableRecording",
     "Value",
     "ViewerError",
     "probe",
     "read",
+    "read_safely",
     "screenshots",
+    "summarise",
     "view",
     "write",
 ]
