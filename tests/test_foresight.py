@@ -79,7 +79,7 @@ def test_ridges_rise_step_by_step_and_are_green_where_the_outcome_is_foretold():
     curves = np.zeros((2, 3))
     curves[1] = [0.0, 1.0, 0.5]
     seen = Insight(curves, np.array([0.2, 0.9]), np.zeros(2), duration=2.0)
-    chunks = list(foresight.chunks(seen, np.array([[-1.0], [0.5]]), success=True))
+    chunks = list(foresight.ridge(seen, np.array([-1.0, 0.5]), last=1, success=True))
     ridge = next(chunk for chunk in chunks if chunk.entity_path == "/ridge/curves").to_record_batch().to_pydict()
     strips, colours = ridge["LineStrips2D:strips"][0], ridge["LineStrips2D:colors"][0]
     np.testing.assert_allclose(strips[0], [[-1, 0], [0, 0], [1, 0]])

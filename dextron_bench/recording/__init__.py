@@ -6,12 +6,14 @@ The only package that talks to Rerun.
 from dextron_bench.recording.archive import BrokenRecording, Recorded, UnwritableRecording, Value, read, write
 from dextron_bench.recording.probe import probe
 from dextron_bench.recording.properties import ReaderError, Summary, read_safely, summarise
+from dextron_bench.recording.stage import Stage, theatre
 from dextron_bench.recording.viewer import ViewerError, screenshots, view
 
 __all__ = [
     "BrokenRecording",
     "ReaderError",
     "Recorded",
+    "Stage",
     "Summary",
     "UnwritableRecording",
     "Value",
@@ -21,6 +23,7 @@ __all__ = [
     "read_safely",
     "screenshots",
     "summarise",
+    "theatre",
     "view",
     "write",
 ]

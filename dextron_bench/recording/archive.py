@@ -67,9 +67,11 @@ def write(
     Raises UnwritableRecording, and ValueError where the arrays make no episode.
     """
     rr.set_strict_mode(True)
-    chunks = [*_chunks(episode, properties), *scene.chunks(episode.states, path)]
+    chunks = [*_chunks(episode, properties), scene.plan(path), *scene.chunks(episode.states)]
     if insight:
-        chunks += [*foresight.looks(), *foresight.chunks(insight, episode.actions, episode.success)]
+        last = len(episode.actions) - 1
+        chunks += [*foresight.looks(), *foresight.chunks(insight, episode.actions)]
+        chunks += foresight.ridge(insight, episode.actions[:, 0], last, episode.success)
     props, told = _props()
     identity = digest([*told, *lines(chunks)])
     chunks += [*props, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]

@@ -20,17 +20,38 @@ BARS, FRAME = (90, 150, 230), (150, 155, 165)
 THRESHOLD = 0.5  # A chance above it foretells success.
 
 
-def chunks(insight: Insight, actions: np.ndarray, success: bool) -> Iterable[Chunk]:
-    """All of it, for the actions (T, 1) that were taken and the outcome."""
+def chunks(insight: Insight, actions: np.ndarray, first: int = 0) -> Iterable[Chunk]:
+    """What changes with the cursor, for the actions (T, 1) that were taken from step `first` on."""
     steps = len(insight.chances)
-    when = scene.timelines(0, steps - 1)
+    when = scene.timelines(first, first + steps - 1)
     foretold = np.stack([insight.chances, np.full(steps, THRESHOLD)], axis=1)
     yield Chunk.from_columns("/success/chance", when, rr.Scalars.columns(scalars=foretold))
     yield Chunk.from_columns("/signals/expert", when, rr.Scalars.columns(scalars=insight.experts))
     yield Chunk.from_columns("/success/curve", when, rr.BarChart.columns(values=_tensors(insight.curves)))
     chosen = rr.BarChart.columns(values=_tensors(insight.chances[:, None]), abscissa=_tensors(actions))
     yield Chunk.from_columns("/success/chosen", when, chosen)
-    yield from _ridge(insight, actions[:, 0], success)
+
+
+def ridge(insight: Insight, actions: np.ndarray, last: int, success: bool | None = None) -> Iterable[Chunk]:
+    """The curves of an episode that ends at step `last`, one above the other, later ones higher; actions are (T,).
+
+    They are green where the outcome is foretold, red where it is not, and blue while it is not known.
+    """
+    steps, grid = len(actions), np.linspace(-WIDTH, WIDTH, insight.curves.shape[1])
+    base = -HEIGHT * np.arange(steps) / max(last, 1)  # The view's y goes down.
+    strips = np.stack([np.broadcast_to(grid, insight.curves.shape), base[:, None] - RISE * insight.curves], axis=2)
+    strips = strips.astype(np.float32)
+    shown = np.arange(0, steps, max(1, last // RIDGES))
+    right = (insight.chances[shown] > THRESHOLD) == success
+    colours = np.where(right[:, None], RIGHT, WRONG) if success is not None else np.array([BARS])
+    curves = rr.LineStrips2D(strips[shown], colors=colours.astype(np.uint8), radii=[0.008])
+    yield scene.static("/ridge/curves", curves)
+    ticks = np.stack([actions, base, actions, base - RISE / 2], axis=1).reshape(-1, 2, 2).astype(np.float32)
+    yield scene.static("/ridge/actions", rr.LineStrips2D(ticks[shown], colors=[TICK], radii=[0.012]))
+    yield scene.static("/ridge/axis", *_axis(insight.duration, last))
+    when = scene.timelines(0, steps - 1)
+    now = np.stack([[[-1.1 * WIDTH, y], [1.1 * WIDTH, y]] for y in base]).astype(np.float32)
+    yield Chunk.from_columns("/ridge/now", when, rr.LineStrips2D.columns(strips=now))
 
 
 def looks() -> list[Chunk]:
@@ -51,32 +72,13 @@ def _look(entity: str, bars: rr.BarChart, *changing: str) -> Chunk:
     return Chunk.from_columns(entity, [], [batch.partition([len(batch.as_arrow_array())]) for batch in batches])
 
 
-def _ridge(insight: Insight, actions: np.ndarray, success: bool) -> Iterable[Chunk]:
-    """Curves one above the other, later ones higher; green where the outcome is foretold, red where it is not."""
-    steps, grid = len(actions), np.linspace(-WIDTH, WIDTH, insight.curves.shape[1])
-    base = -HEIGHT * np.arange(steps) / max(steps - 1, 1)  # The view's y goes down.
-    strips = np.stack([np.broadcast_to(grid, insight.curves.shape), base[:, None] - RISE * insight.curves], axis=2)
-    strips = strips.astype(np.float32)
-    shown = np.arange(0, steps, max(1, steps // RIDGES))
-    right = (insight.chances[shown] > THRESHOLD) == success
-    colours = np.where(right[:, None], RIGHT, WRONG).astype(np.uint8)
-    yield scene.static("/ridge/curves", rr.LineStrips2D(strips[shown], colors=colours, radii=[0.008]))
-    ticks = np.stack([actions, base, actions, base - RISE / 2], axis=1).reshape(-1, 2, 2).astype(np.float32)
-    yield scene.static("/ridge/actions", rr.LineStrips2D(ticks[shown], colors=[TICK], radii=[0.012]))
-    yield scene.static("/ridge/axis", *_axis(insight.duration, steps))
-    when = scene.timelines(0, steps - 1)
-    now = np.stack([[[-1.1 * WIDTH, y], [1.1 * WIDTH, y]] for y in base]).astype(np.float32)
-    yield Chunk.from_columns("/ridge/now", when, rr.LineStrips2D.columns(strips=now))
-
-
-def _axis(duration: float, steps: int) -> tuple[rr.LineStrips2D, rr.Points2D]:
+def _axis(duration: float, last: int) -> tuple[rr.LineStrips2D, rr.Points2D]:
     """The end of the reach, and what the sides and ends of the plot are."""
-    over = -HEIGHT * duration / max(steps - 1, 1)
-    places = [[-WIDTH, 0.15], [0.0, 0.15], [WIDTH, 0.15]]
-    labels = ["open", "action", "close"]
-    if duration < steps:
+    over = -HEIGHT * duration / max(last, 1)
+    places, labels = [[-WIDTH, 0.15], [0.0, 0.15], [WIDTH, 0.15]], ["open", "action", "close"]
+    if duration <= last:
         places, labels = [*places, [-0.6 * WIDTH, over]], [*labels, "reach ends"]
-    line = [[[-WIDTH, over], [WIDTH, over]]] if duration < steps else []
+    line = [[[-WIDTH, over], [WIDTH, over]]] if duration <= last else []
     marks = rr.Points2D(places, labels=labels, radii=[0.001], colors=[FRAME], show_labels=True)
     return rr.LineStrips2D(line, colors=[FRAME], radii=[0.006]), marks
 

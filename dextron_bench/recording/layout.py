@@ -38,13 +38,19 @@ DIGEST = 64  # Characters of a hash, of which the card shows eight.
 BACKGROUND = (33, 38, 45)
 
 
-def signals(states: np.ndarray) -> Iterable[Chunk]:
-    """What is plotted beside actions and rewards, derived from states (T, 48)."""
+def signals(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
+    """What is plotted beside actions and rewards, derived from states (T, 48) from step `first` on."""
     lifted = np.full(len(states), task.LIFTED)
     metres = np.stack([task.distance(states), task.bottle_height(states), lifted], axis=1)
-    when = scene.timelines(0, len(states) - 1)
+    when = scene.timelines(first, first + len(states) - 1)
     yield Chunk.from_columns("/signals/closure", when, rr.Scalars.columns(scalars=task.closure(states)))
     yield Chunk.from_columns("/signals/metres", when, rr.Scalars.columns(scalars=metres))
+
+
+def actions(taken: np.ndarray, first: int = 0) -> Chunk:
+    """The actions (T, 1) that were taken from step `first` on."""
+    when = scene.timelines(first, first + len(taken) - 1)
+    return Chunk.from_columns("/episode/actions", when, rr.Scalars.columns(scalars=taken))
 
 
 def lines() -> list[Chunk]:
@@ -88,8 +94,11 @@ def _cell(value: object) -> str:
 
 
 @cache
-def blueprint(foretold: bool = False) -> rrb.Blueprint:
-    """3D view on the left; card and plots on the right; where success is foretold its curve and its ridge plot too."""
+def blueprint(foretold: bool = False, live: bool = False) -> rrb.Blueprint:
+    """3D view on the left; card and plots on the right; where success is foretold its curve and its ridge plot too.
+
+    What is `live` is shown as it comes.
+    """
     text = rrb.TextDocumentView(origin="/card", name="Episode")
     plots = [_plot(name, foretold) for name in PLOTS]
     told = rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3])
@@ -100,7 +109,7 @@ def blueprint(foretold: bool = False) -> rrb.Blueprint:
         content = rrb.Horizontal(_space(), told, column_shares=[3, 2])
     return rrb.Blueprint(
         content,
-        rrb.TimePanel(timeline="step", fps=50.0, play_state="paused", state="collapsed"),
+        rrb.TimePanel(timeline="step", fps=50.0, play_state="following" if live else "paused", state="collapsed"),
         rrb.SelectionPanel(state="hidden"),
         rrb.BlueprintPanel(state="hidden"),
         auto_views=False,

@@ -34,9 +34,9 @@ def static(entity: str, *contents: rr.AsComponents) -> Chunk:
     return Chunk.from_columns(entity, [], [batch.partition([n]) for batch, n in filled if n])
 
 
-def chunks(states: np.ndarray, path: reach.Path) -> Iterable[Chunk]:
-    """Everything in the 3D view for states (T, 48) of an episode along `path`."""
-    when = timelines(0, len(states) - 1)
+def chunks(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
+    """Everything that moves in the 3D view for states (T, 48) of an episode from step `first` on."""
+    when = timelines(first, first + len(states) - 1)
     positions, quaternions, touched = poses(states)
     for body in range(1, positions.shape[1]):
         moves = rr.Transform3D.columns(translation=positions[:, body], quaternion=quaternions[:, body][:, XYZW])
@@ -46,9 +46,14 @@ def chunks(states: np.ndarray, path: reach.Path) -> Iterable[Chunk]:
     centre = task.palm_centre(states)
     yield Chunk.from_columns("/world/palm_centre", when, rr.Points3D.columns(positions=centre))
     legs = np.stack([centre[:-1], centre[1:]], axis=1)
-    yield Chunk.from_columns(TRACE, timelines(1, len(legs)), rr.LineStrips3D.columns(strips=legs))
+    later = timelines(first + 1, first + len(legs))
+    yield Chunk.from_columns(TRACE, later, rr.LineStrips3D.columns(strips=legs))
+
+
+def plan(path: reach.Path) -> Chunk:
+    """The way that the palm's centre is to go."""
     planned = reach.palm_centre(path.positions, path.quaternions)
-    yield static("/world/path", rr.LineStrips3D([planned], radii=[0.0012], colors=[PATH_COLOUR]))
+    return static("/world/path", rr.LineStrips3D([planned], radii=[0.0012], colors=[PATH_COLOUR]))
 
 
 def poses(states: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:

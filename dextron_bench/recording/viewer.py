@@ -32,9 +32,9 @@ def view(files: Sequence[Path]) -> None:
     Raises ViewerError, and FileNotFoundError for a recording that is not there.
     """
     _all_there(files)
-    with _viewer(["--port", "auto", *map(str, files)], logs=None) as process:
-        if process.wait():
-            raise ViewerError(f"Rerun's viewer ended with code {process.returncode}; does this machine have a screen?")
+    with process(["--port", "auto", *map(str, files)]) as opened:
+        if opened.wait():
+            raise ViewerError(f"Rerun's viewer ended with code {opened.returncode}; does this machine have a screen?")
 
 
 def screenshots(file: Path, pictures: Mapping[int, Path], width: int = 1600, height: int = 900) -> None:
@@ -43,11 +43,11 @@ def screenshots(file: Path, pictures: Mapping[int, Path], width: int = 1600, hei
     Needs a Vulkan driver (Debian: apt install mesa-vulkan-drivers). Raises ViewerError, FileNotFoundError.
     """
     _all_there([file])
-    port = _free_port()
+    port = free_port()
     window = ["--headless", "--window-size", f"{width}x{height}", "--hide-welcome-screen", "--port", str(port)]
-    with TemporaryFile() as logs, _viewer(window, logs) as process:
+    with TemporaryFile() as logs, process(window, logs) as opened:
         try:
-            client = _connect(port, process)
+            client = ViewerClient.connect(address(port, opened))
             client.open(str(file.resolve()))
             time.sleep(NOTICES)
             for step, picture in pictures.items():
@@ -68,33 +68,34 @@ def _all_there(files: Sequence[Path]) -> None:
 
 
 @contextmanager
-def _viewer(arguments: Sequence[str], logs: IO[bytes] | None) -> Iterator[subprocess.Popen[bytes]]:
+def process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
     """A viewer process, ended with all its children when the block is left."""
     command = [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *arguments]
     environment = {"WGPU_BACKEND": "vulkan", **os.environ} if logs else None
-    process = subprocess.Popen(command, env=environment, stdout=logs, stderr=logs, start_new_session=True)
+    opened = subprocess.Popen(command, env=environment, stdout=logs, stderr=logs, start_new_session=True)
     try:
-        yield process
+        yield opened
     finally:
         with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGTERM)
-        process.wait()
+            os.killpg(opened.pid, signal.SIGTERM)
+        opened.wait()
 
 
-def _connect(port: int, process: subprocess.Popen[bytes]) -> ViewerClient:
-    """A line to the viewer, once it listens; raises ViewerError."""
+def address(port: int, opened: subprocess.Popen[bytes]) -> str:
+    """Where a viewer is reached, once it listens; raises ViewerError."""
     until = time.monotonic() + PATIENCE
-    while time.monotonic() < until and process.poll() is None:
+    while time.monotonic() < until and opened.poll() is None:
         try:
             socket.create_connection((LOOPBACK, port), timeout=1).close()
         except OSError:
             time.sleep(0.2)
         else:
-            return ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
-    raise ViewerError("Rerun's viewer did not come up")
+            return f"rerun+http://{LOOPBACK}:{port}/proxy"
+    raise ViewerError("Rerun's viewer did not come up; does this machine have a screen?")
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port that nobody listens at."""
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         return probe.getsockname()[1]
