@@ -15,7 +15,21 @@ from typing import Annotated, Any, Protocol, Union
 
 import tyro
 
-from dextron_bench.verbs import data, data_model, doctor, figures, leaderboard, mc, run, settings, splits, success, view
+from dextron_bench.verbs import (
+    data,
+    data_export,
+    data_model,
+    doctor,
+    figures,
+    foretelling,
+    leaderboard,
+    mc,
+    run,
+    settings,
+    splits,
+    success,
+    view,
+)
 from dextron_bench.verbs import eval as evaluation
 from dextron_bench.verbs import list as listing
 
@@ -38,17 +52,18 @@ VERBS: dict[str, type[Verb] | Group] = {
     "view": view.View,
     "list": listing.List,
     "data": (
-        "Reaches: import or fetch the recorded ones, see what a source holds, fit and judge the synthetic ones.",
+        "Reaches: import or fetch the recorded ones, see what a source holds, fit and judge the synthetic ones; "
+        "export episodes for offline learning.",
         {
             **{"import": data.Import, "fetch": data.Fetch, "info": data.Info},
-            **{"fit": data_model.Fit, "likeness": data_model.Likeness},
+            **{"fit": data_model.Fit, "likeness": data_model.Likeness, "export": data_export.Export},
         },
     ),
     "mc": mc.MonteCarlo,
     "splits": splits.Splits,
     "success": (
         "The success model: play its data set, train it, judge it, explain episodes by it.",
-        {"data": success.Data, "train": success.Train, "eval": success.Eval, "explain": success.Explain},
+        {"data": success.Data, "train": success.Train, "eval": foretelling.Eval, "explain": foretelling.Explain},
     ),
     "figures": figures.Figures,
     "doctor": doctor.Doctor,
