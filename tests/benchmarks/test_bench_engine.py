@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 from pytest_benchmark.fixture import BenchmarkFixture
 from workload import Prepared, cases, reaches
 
-from dextron_bench import recording, rollout
+from dextron_bench import rollout
 from dextron_bench.experts import ExpertAgent
 from dextron_bench.world import model
 from dextron_bench.world.engine import Engine, Step
@@ -118,17 +118,3 @@ def test_reach_preparation(benchmark: BenchmarkFixture):
         source.path(setting)  # Splines are kept from the first use on, as in a search.
     seconds = alone(benchmark, lambda: [source.path(setting) for setting in asked], ROUNDS)
     note(benchmark, Row(f"Paths of settings, {source.name} reaches", "paths/s", len(asked) / seconds))
-
-
-def test_recording_against_rollout(benchmark: BenchmarkFixture, tmp_path):
-    played = cases(scaled(32))
-    source = Prepared(played)
-    episodes: dict[int, rollout.Episode] = {}
-
-    def write() -> None:
-        for index, episode in episodes.items():
-            recording.write(tmp_path / f"{index}.rrd", episode, source.path(episode.setting), {"row": index})
-
-    seconds, rolled = in_turns(benchmark, write, lambda: episodes.update(play(played, source, 0)), ROUNDS)
-    rates = len(played) / seconds, len(played) / rolled
-    note(benchmark, Row("Episodes recorded", "episodes/s", rates[0], "episodes rolled out, all cores", rates[1]))
