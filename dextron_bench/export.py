@@ -77,8 +77,8 @@ class Export:
     def write(self, source: Source, into: Path, threads: int = 0, report: Report = lambda done, wanted: None) -> Path:
         """Plays the episodes and stores them below the folder `into`; returns the data set's own folder.
 
-        Nothing else is written, and after an error nothing of it is left. Raises MissingMinari, BadExport where the data
-        set is there already or a player fails, and what `rollout` does.
+        Nothing else is written, and after an error nothing of it is left. Raises MissingMinari, BadExport where the
+        data set is there already or a player fails, and what `rollout` does.
         """
         folder = into / self.name
         with _whole(folder) as part:
