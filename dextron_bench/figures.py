@@ -101,6 +101,22 @@ def learning_curves(curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFra
     figure.savefig(file, dpi=150)
 
 
+def success_curve(points: list[dict[str, float]], file: Path) -> None:
+    """Draws loss and accuracy of the success model against epochs, learned and held-out (paper, Fig. 4b).
+
+    Raises UnknownFormat, OSError.
+    """
+    _check(file)
+    figure = Figure(figsize=(8, 3.5), layout="constrained")
+    table = pd.DataFrame(points).set_index("epoch")
+    for axes, name in zip(figure.subplots(1, 2), ("loss", "accuracy"), strict=True):
+        axes.plot(table.index, table[name], label="episodes learned from")
+        axes.plot(table.index, table[f"test_{name}"], label="episodes held out")
+        axes.set(xlabel="epoch", ylabel="cross entropy" if name == "loss" else name)
+        axes.legend(fontsize=8)
+    figure.savefig(file, dpi=150)
+
+
 def ridges(curves: dict[str, Foresight], file: Path) -> None:
     """Draws what the success model thinks of every action, a curve a step, for titled episodes (paper, Fig. 5).
 

@@ -44,6 +44,13 @@ def labels(learner: Learner, reaches: str) -> list[str]:
     return sorted(found.parent.name for found in place(learner, reaches).parents[1].glob(f"*/{reaches}"))
 
 
+def everything(reaches: str) -> list[Path]:
+    """All weights that ship for a source of reaches, those of the methods' own and their neighbours', in order."""
+    learners = [made for made in map(methods.create, methods.known()) if isinstance(made, Learner)]
+    beside = {place(learner, reaches).parents[1] for learner in learners}
+    return sorted(file for folder in beside for file in folder.glob(f"*/{reaches}/seed*.safetensors"))
+
+
 def about(file: Path) -> dict[str, Any]:
     """What a file's weights come from, and the SHA-256 of the file; raises BadTensors, OSError."""
     found = tensors.read_about(file)

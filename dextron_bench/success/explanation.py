@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from dextron_bench.diagnosis import Diagnosis
-from dextron_bench.rollout import Episode
+from dextron_bench.diagnosis import Diagnosis, diagnose
+from dextron_bench.experts import ExpertAgent
+from dextron_bench.rollout import Agent, Case, Episode, rollout
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.world import model as world
 from dextron_bench.world.setting import Source
@@ -55,6 +56,16 @@ def foresee(model: SuccessModel, source: Source, player: str, episode: Episode, 
     before, actions = episode.states[:-1], episode.actions[:, 0]
     times = np.arange(len(actions)) * world.CONTROL_STEP / source.duration(episode.setting)
     return Foresight(player, episode, diagnosis, model.curve(before), model.chance(before, actions), times)
+
+
+def foreseen(
+    model: SuccessModel, source: Source, cases: Sequence[Case], policies: Mapping[str, Agent], threads: int = 0
+) -> Iterator[Foresight]:
+    """Episodes of experts and of named policies on the same cases, as the model foretells them."""
+    for player, agent in {EXPERT: ExpertAgent(), **policies}.items():
+        played = dict(rollout(agent, source, cases, threads=threads))
+        for row, case in enumerate(cases):
+            yield foresee(model, source, player, played[row], diagnose(played[row], case))
 
 
 def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import as_file, files
+from importlib.resources.abc import Traversable
+from typing import Any
 
 import numpy as np
 
@@ -69,10 +71,18 @@ class SuccessModel:
 @cache
 def shipped(reaches: str) -> SuccessModel:
     """The model that ships for a source of reaches; raises MissingModel."""
+    with as_file(_place(reaches)) as file:
+        return SuccessModel(tensors.read(file))
+
+
+def told(reaches: str) -> dict[str, Any]:
+    """What the file of the model that ships says of its training: `fit`, `rows`, `curve`; raises MissingModel."""
+    with as_file(_place(reaches)) as file:
+        return tensors.read_about(file)
+
+
+def _place(reaches: str) -> Traversable:
     place = files("dextron_bench") / "data" / f"success-{reaches}.safetensors"
     if not place.is_file():
-        raise MissingModel(
-            f"no success model ships for {reaches} reaches; train one with `dextron-bench success train`"
-        )
-    with as_file(place) as file:
-        return SuccessModel(tensors.read(file))
+        raise MissingModel(f"no success model ships for {reaches} reaches; `dextron-bench success train` makes one")
+    return place

@@ -1,7 +1,8 @@
-"""`dextron-bench figures`: the paper's figures from the shipped data."""
+"""`dextron-bench figures`: the paper's figures from what ships and what was published."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -9,7 +10,10 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Figures:
-    """Draw the paper's figure 3 (all reaches, and where those that can be grasped start) and the README's pictures.
+    """Draw the paper's figures 3, 4 and 5, and the README's pictures.
+
+    3: where settings that can be grasped start, and all reaches. 4: learning curves of the methods and of the success
+    model. 5: what the success model thinks in five kinds of episodes, which are played and found anew.
 
     Example: dextron-bench figures --reaches synthetic --into figures
     """
@@ -18,19 +22,59 @@ class Figures:
     """The source of reaches."""
     into: Path = Path("figures")
     """Folder for the pictures."""
+    results: Path = Path("leaderboard/results")
+    """Results whose learning curves are figure 4a; where the folder is not there, it is left out."""
     rows: int = 3000
     """Points in figure 3a at most."""
+    settings: int = 100
+    """Settings of `test` on which figure 5 plays experts and the policies that ship."""
+    threads: int = 0
+    """Threads of the simulation; 0 takes one for each processor."""
 
     def __call__(self) -> int:
-        from dextron_bench import database, figures, partition, pictures
+        from dextron_bench import pictures
+
+        self.into.mkdir(parents=True, exist_ok=True)
+        for file in (*self._reaches(), *self._learning(), *self._success(), *pictures.write_pictures(self.into)):
+            print(file)
+        return 0
+
+    def _file(self, name: str) -> Path:
+        return self.into / f"{name}-{self.reaches}.png"
+
+    def _reaches(self) -> Iterator[Path]:
+        from dextron_bench import database, figures, partition
         from dextron_bench.world.sources import open_source
 
         source = open_source(self.reaches)
-        self.into.mkdir(parents=True, exist_ok=True)
         solved = database.shipped(self.reaches)[0].query("score == 20")
         solved = solved.drop_duplicates(partition.SETTING).head(self.rows)
-        starts, paths = (self.into / f"fig3{part}-{self.reaches}.png" for part in "ab")
-        figures.start_points(source, solved, starts)
-        figures.reach_paths(source, paths)
-        print(starts, paths, *pictures.write_pictures(self.into), sep="\n")
-        return 0
+        figures.start_points(source, solved, self._file("fig3a"))
+        yield self._file("fig3a")
+        figures.reach_paths(source, self._file("fig3b"))
+        yield self._file("fig3b")
+
+    def _learning(self) -> Iterator[Path]:
+        from dextron_bench import figures, leaderboard, publication, records
+
+        found = publication.learning_curves(self.results)
+        curves = {method: own for (method, reaches), own in found.items() if reaches == self.reaches}
+        if curves:
+            rows = leaderboard.table(records.results(self.results))
+            figures.learning_curves(curves, rows[rows["reaches"] == self.reaches], self._file("fig4a"))
+            yield self._file("fig4a")
+
+    def _success(self) -> Iterator[Path]:
+        from dextron_bench import figures, splits, weights
+        from dextron_bench.success import explanation, network
+        from dextron_bench.world.sources import open_source
+
+        figures.success_curve(network.told(self.reaches)["curve"], self._file("fig4b"))
+        yield self._file("fig4b")
+        files = [file for file in weights.everything(self.reaches) if file.stem == "seed0"]
+        policies = {file.parts[-3]: weights.own(file) for file in files}
+        model, cases = network.shipped(self.reaches), splits.load(self.reaches, "test").cases[: self.settings]
+        seen = explanation.foreseen(model, open_source(self.reaches), cases, policies, self.threads)
+        chosen = explanation.choose(seen)
+        figures.ridges({explanation.KINDS[kind]: each for kind, each in chosen.items()}, self._file("fig5"))
+        yield self._file("fig5")
