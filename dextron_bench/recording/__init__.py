@@ -4,6 +4,7 @@ The only package that talks to Rerun.
 """
 
 from dextron_bench.recording.archive import BrokenRecording, Recorded, UnwritableRecording, Value, read, write
+from dextron_bench.recording.pair import UnequalSettings, pair
 from dextron_bench.recording.probe import probe
 from dextron_bench.recording.properties import ReaderError, Summary, read_safely, summarise
 from dextron_bench.recording.stage import Stage, theatre
@@ -15,9 +16,11 @@ __all__ = [
     "Recorded",
     "Stage",
     "Summary",
+    "UnequalSettings",
     "UnwritableRecording",
     "Value",
     "ViewerError",
+    "pair",
     "probe",
     "read",
     "read_safely",

@@ -75,11 +75,16 @@ def write(
     props, told = _props()
     identity = digest([*told, *lines(chunks)])
     chunks += [*props, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
+    return save(file, chunks, identity, layout.blueprint(insight is not None))
+
+
+def save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> str:
+    """Writes chunks to `file`, whole or not at all; returns the file's SHA-256. Raises UnwritableRecording."""
     temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         temporary.touch()
-        _save(temporary, chunks, identity, layout.blueprint(insight is not None))
+        _save(temporary, chunks, identity, blueprint)
         sha256 = _seal(temporary)
         os.replace(temporary, file)
     except (OSError, RuntimeError) as error:

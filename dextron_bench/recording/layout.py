@@ -103,10 +103,15 @@ def blueprint(foretold: bool = False, live: bool = False) -> rrb.Blueprint:
     plots = [_plot(name, foretold) for name in PLOTS]
     told = rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3])
     if foretold:
-        seen = rrb.Vertical(_space(), _bars(), row_shares=[5, 2])
+        seen = rrb.Vertical(space(), _bars(), row_shares=[5, 2])
         content = rrb.Horizontal(seen, told, _ridge(), column_shares=[9, 7, 4])
     else:
-        content = rrb.Horizontal(_space(), told, column_shares=[3, 2])
+        content = rrb.Horizontal(space(), told, column_shares=[3, 2])
+    return page(content, live)
+
+
+def page(content: rrb.Container, live: bool = False) -> rrb.Blueprint:
+    """Content with the time below it, and nothing else open."""
     return rrb.Blueprint(
         content,
         rrb.TimePanel(timeline="step", fps=50.0, play_state="following" if live else "paused", state="collapsed"),
@@ -117,17 +122,18 @@ def blueprint(foretold: bool = False, live: bool = False) -> rrb.Blueprint:
     )
 
 
-def _space() -> rrb.Spatial3DView:
+def space(root: str = "", name: str = "Grasp") -> rrb.Spatial3DView:
+    """The 3D view of the world below a root, framed on the grasp."""
     eye = rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=EYE, look_target=TARGET, eye_up=(0, 0, 1))
     start, now = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
     trail = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=now) for line in ("step", "seconds")])
     return rrb.Spatial3DView(
-        origin="/world",
-        name="Grasp",
+        origin=f"{root}/world",
+        name=name,
         eye_controls=eye,
         line_grid=False,
         background=rrb.Background(color=BACKGROUND),
-        overrides={scene.TRACE: trail},
+        overrides={root + scene.TRACE: trail},
     )
 
 
