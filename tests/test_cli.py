@@ -120,6 +120,7 @@ def test_an_agent_that_cannot_begin_is_one_line(here: Path, complaint: Callable[
         (["data", "info", "--reaches", "real"], "data import --from"),
         (["mc", "--share", "2/2", "--reaches", "synthetic"], "share 2/2 does not exist"),
         (["mc", "--seed", "-1"], "a seed of 0 or more"),
+        (["view"], "no recordings at runs"),
         (["view", "nowhere"], "no recordings at nowhere"),
         (["splits", "--reaches", "synthetic", "--database", "no.parquet", "--into", "new"], "no.json"),
     ],
@@ -129,7 +130,9 @@ def test_what_is_not_there_is_one_line(here: Path, complaint: Callable[..., str]
     assert sorted(os.listdir(here)) == ["data"]
 
 
-@pytest.mark.parametrize("words", [["nosuch"], ["run", "--reaches", "nosuch"], ["run", "--seed", "x"], ["view"]])
+@pytest.mark.parametrize(
+    "words", [["nosuch"], ["run", "--reaches", "nosuch"], ["run", "--seed", "x"], ["view", "--row", "x"]]
+)
 def test_wrong_words_are_code_2(words: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:
         cli.main(words)

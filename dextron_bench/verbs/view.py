@@ -1,38 +1,97 @@
-"""`dextron-bench view`: open recordings."""
+"""`dextron-bench view`: open recordings, those that are there or those of picked episodes."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from dextron_bench.verbs.printing import print_table, progress_bar
 
-class NothingToView(ValueError):
-    """A place without recordings."""
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from dextron_bench.gallery import Wish
 
 
 @dataclass(frozen=True)
 class View:
-    """Open the recordings of a run, or recording files, in the Rerun viewer; no network is needed.
+    """Open recordings in the Rerun viewer, all together; no network is needed.
+
+    As it is, all recordings at the places. With an option that picks (--worst to --row), episodes of the runs there,
+    the first five where neither --worst nor --best says how many; what is not recorded yet is played again
+    from the actions that were taken, and recorded in its run's folder.
 
     Example: dextron-bench view runs/exp/synthetic/seed0
+
+    Example: dextron-bench view --worst 5 --method rlil-0.1 --reaches real --split unseen-subject --seed 0
     """
 
-    place: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN|FILE")]
-    """A run's folder, or one recording."""
+    place: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN|FILE|DIR ...")] = ()
+    """Folders of runs or recordings, or single recordings; by default the folder of all runs."""
+    worst: int | None = None
+    """Pick so many episodes with the lowest return."""
+    best: int | None = None
+    """Pick so many episodes with the highest return."""
+    method: tuple[str, ...] = ()
+    """Pick among these methods' episodes, called as on the leaderboard."""
+    reaches: tuple[Literal["real", "synthetic", "minjerk"], ...] = ()
+    """Pick among episodes on these sources of reaches."""
+    split: tuple[str, ...] = ()
+    """Pick among episodes of these splits."""
+    seed: tuple[int, ...] = ()
+    """Pick among episodes of agents with these seeds."""
+    failed: bool = False
+    """Pick among episodes that did not succeed."""
+    cause: tuple[str, ...] = ()
+    """Pick among episodes that ended so, as in "too late"; docs/diagnosis.md has all causes."""
+    row: tuple[int, ...] = ()
+    """Pick among these rows of the splits."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    print: bool = False
+    """Print the files, one a line, in place of opening them; needs no screen."""
+    quiet: bool = False
+    """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench import recording
+        from dextron_bench import gallery, recording
 
-        recording.view(recordings(self.place))
+        places, wish = self.place or (self.runs,), self._wish()
+        files = gallery.recordings(places) if wish == gallery.Wish() else self._picked(places, wish)
+        if self.print:
+            print(*files, sep="\n")
+        else:
+            recording.view(files)
         return 0
 
+    def _wish(self) -> Wish:
+        from dextron_bench.gallery import Wish
 
-def recordings(place: Path) -> list[Path]:
-    """The recordings at a place; raises NothingToView."""
-    found = [place] if place.is_file() else sorted(place.glob("**/*.rrd"))
-    if not found:
-        raise NothingToView(f"no recordings at {place}; make some with `dextron-bench run --record 3`")
-    return found
+        return Wish(**{name: getattr(self, name) for name in Wish.__slots__})
+
+    def _picked(self, places: Sequence[Path], wish: Wish) -> list[Path]:
+        """The recordings of picked episodes; what they are is told, where no program reads it."""
+        from dextron_bench import gallery, restoration
+
+        picked, matching = gallery.pick(gallery.episodes(places), wish)
+        with progress_bar("recordings", self.quiet) as progress:
+            files = restoration.restore(picked, progress)
+        if not self.print:
+            _tell(picked)
+        if len(picked) < matching and wish.worst is None and wish.best is None:
+            told = (
+                f"{matching} episodes are as asked for, these are the first {len(picked)}; --worst {matching} takes all"
+            )
+            print(f"dextron-bench: {told}", file=sys.stderr)
+        return files
+
+
+def _tell(picked: pd.DataFrame) -> None:
+    columns = ["method", "reaches", "seed", "split", "row", "score", "length", "cause"]
+    named = [{"score": "return", "length": "steps"}.get(column, column) for column in columns]
+    print_table("episodes", named, picked[columns].itertuples(index=False))

@@ -1,0 +1,100 @@
+"""`dextron-bench view` from the command line: the right recordings are opened, and made where they are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import tiny
+
+from dextron_bench import cli, recording
+
+NOTHING = "runs/nothing/synthetic/seed0"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A working folder in the tiny world with two runs: one of two solved episodes, one of two that failed."""
+    tiny.install(tiny.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    words = ["--split", "test", "--no-floors", "--quiet", "--json"]
+    assert cli.main(["run", "--method", "exp", "--record", "1", *words]) == 0
+    assert cli.main(["run", "--method", "nothing", "--record", "0", *words]) == 0
+    yield tmp_path
+    tiny.forget()
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What the viewer, which needs a screen, was given."""
+    found: list[str] = []
+
+    def view(files: Sequence[Path]) -> None:
+        assert all(file.is_file() for file in files)
+        found.extend(str(file) for file in files)
+
+    monkeypatch.setattr(recording, "view", view)
+    return found
+
+
+def test_without_a_wish_what_is_there_is_opened(here: Path, opened: list[str]):
+    assert cli.main(["view"]) == 0
+    assert cli.main(["view", "runs/exp/synthetic/seed0"]) == 0
+    assert cli.main(["view", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]) == 0
+    assert opened == ["runs/exp/synthetic/seed0/recordings/test-0000.rrd"] * 3
+    assert not (here / NOTHING / "recordings").exists()
+
+
+def test_the_worst_and_the_best_are_opened_together_and_told(
+    here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
+):
+    capsys.readouterr()
+    assert cli.main(["view", "--worst", "1", "--best", "1", "--quiet"]) == 0
+    assert opened == [f"{NOTHING}/recordings/test-0000.rrd", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]
+    printed = capsys.readouterr()
+    assert [word in printed.out for word in ("nothing", "exp", "solved", "return")] == [True] * 4
+    assert printed.err == ""
+    made = recording.read(here / opened[0])
+    assert made.properties["method"] == "nothing"
+    row = pd.read_parquet(here / NOTHING / "episodes.parquet").iloc[0]
+    assert (made.episode.score, len(made.episode.actions)) == (row["score"], row["length"])
+
+
+def test_files_are_printed_for_other_programs(here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]):
+    capsys.readouterr()
+    words = ["--failed", "--print", "--method", "nothing", "--split", "test", "--reaches", "synthetic", "--seed", "0"]
+    assert cli.main(["view", ".", *words]) == 0
+    printed = capsys.readouterr()
+    assert (opened, printed.err) == ([], "")
+    assert printed.out.splitlines() == [f"{NOTHING}/recordings/test-000{row}.rrd" for row in (0, 1)]
+    assert cli.main(["view", "--runs", "runs", "--row", "1", "--print"]) == 0
+    assert [line.split("/")[1] for line in capsys.readouterr().out.splitlines()] == ["exp", "nothing"]
+
+
+def test_where_more_match_it_says_how_to_have_them(
+    here: Path, opened: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    from dextron_bench import gallery
+
+    monkeypatch.setattr(gallery, "LIMIT", 1)
+    assert cli.main(["view", "--split", "test"]) == 0
+    assert "4 episodes are as asked for, these are the first 1; --worst 4 takes all" in capsys.readouterr().err
+    assert len(opened) == 1
+
+
+def test_what_cannot_be_opened_is_one_line(here: Path, opened: list[str], complaint: Callable[..., str]):
+    assert "no recordings at data" in complaint("view", "data")
+    assert "no runs at data to pick episodes from" in complaint("view", "data", "--failed")
+    assert "there are exp, nothing" in complaint("view", "--method", "bc")
+    assert "pick 1 episode or more" in complaint("view", "--worst", "0")
+    assert "of 4 episodes 0 are as asked for" in complaint("view", "--failed", "--method", "exp")
+    file = "runs/exp/synthetic/seed0/recordings/test-0000.rrd"
+    assert "is a file: episodes are picked from runs" in complaint("view", file, "--worst", "1")
+    table = here / NOTHING / "episodes.parquet"
+    pd.read_parquet(table).drop(columns="actions").to_parquet(table)
+    assert "its actions were not kept; remove" in complaint("view", "--method", "nothing", "--quiet")
+    table.write_bytes(b"")
+    assert f"{NOTHING}/episodes.parquet is damaged" in complaint("view", "--worst", "1")
+    assert opened == []

@@ -1,0 +1,82 @@
+"""Episodes to look at: the right ones are picked, in the right order, and wishes that cannot be say what could."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from dextron_bench import gallery
+from dextron_bench.gallery import BadWish, NothingToView, Wish
+
+COLUMNS = ["method", "reaches", "seed", "split", "row", "score", "length", "cause"]
+TABLE = pd.DataFrame(
+    [
+        ("bc", "real", 0, "test", 0, 20.0, 90, "solved"),
+        ("bc", "real", 0, "test", 1, 3.0, 90, "slipped"),
+        ("bc", "real", 0, "test", 2, 0.0, 90, "too late"),
+        ("bc", "real", 1, "val", 0, 0.0, 90, "too early"),
+        ("rl", "real", 0, "test", 0, 3.0, 90, "too late"),
+        ("rl", "real", 0, "test", 1, 0.0, 0, "agent failed"),
+        ("rl", "synthetic", 0, "test", 0, 20.0, 90, "solved"),
+    ],
+    columns=COLUMNS,
+).assign(success=lambda table: table["score"] == 20.0)
+
+
+@pytest.mark.parametrize(
+    ("wish", "picked", "matching"),
+    [
+        ({}, [0, 1, 2, 3, 4], 6),  # An episode without a step cannot be looked at.
+        ({"worst": 3}, [2, 3, 1], 6),  # Equal returns in the order of the tables.
+        ({"best": 3}, [0, 6, 1], 6),
+        ({"worst": 1, "best": 1}, [2, 0], 6),
+        ({"worst": 4, "best": 4}, [2, 3, 1, 4, 0, 6], 6),  # Each once.
+        ({"worst": 100}, [2, 3, 1, 4, 0, 6], 6),
+        ({"failed": True}, [1, 2, 3, 4], 4),
+        ({"failed": True, "best": 2}, [1, 4], 4),
+        ({"cause": ("too late",)}, [2, 4], 2),
+        ({"cause": ("too late", "too early"), "split": ("val",)}, [3], 1),
+        ({"method": ("rl",), "reaches": ("real",)}, [4], 1),
+        ({"seed": (1,)}, [3], 1),
+        ({"row": (0,), "split": ("test",)}, [0, 4, 6], 3),
+    ],
+)
+def test_a_wish_picks_these_episodes(wish: dict[str, Any], picked: list[int], matching: int):
+    found, count = gallery.pick(TABLE, Wish(**wish))
+    assert (found.index.tolist(), count) == (picked, matching)
+
+
+@pytest.mark.parametrize(
+    ("wish", "told"),
+    [
+        ({"method": ("bc", "rlil")}, "no episode has method 'rlil'; there are bc, rl"),
+        ({"seed": (7,)}, "no episode has seed 7; there are 0, 1"),
+        ({"row": (3,)}, "no episode has row 3; there are 0 to 2"),
+        ({"cause": ("late",)}, "no episode has cause 'late'; there are solved, too early, too late, knocked over, "),
+        ({"cause": ("knocked over",)}, "of 7 episodes 0 are as asked for"),
+        ({"cause": ("agent failed",)}, "of 7 episodes 1 are as asked for; the agent failed before their first step"),
+    ],
+)
+def test_what_no_episode_has_is_told_with_what_there_is(wish: dict[str, Any], told: str):
+    with pytest.raises(NothingToView) as caught:
+        gallery.pick(TABLE, Wish(**wish))
+    assert str(caught.value).startswith(told)
+
+
+@pytest.mark.parametrize("count", [0, -1])
+def test_fewer_than_one_episode_is_no_wish(count: int):
+    with pytest.raises(BadWish, match=f"--best {count}: pick 1 episode or more"):
+        Wish(best=count)
+
+
+def test_recordings_are_found_at_files_and_below_folders_each_once(tmp_path: Path):
+    files = [tmp_path / "a" / "recordings" / "test-0001.rrd", tmp_path / "a" / "recordings" / "test-0000.rrd"]
+    files[0].parent.mkdir(parents=True)
+    for file in files:
+        file.touch()
+    assert gallery.recordings([files[0], tmp_path]) == files
+    with pytest.raises(NothingToView, match=r"no recordings at .*empty"):
+        gallery.recordings([tmp_path, tmp_path / "empty"])
