@@ -79,11 +79,11 @@ def whose(folder: Path) -> dict[str, Any]:
 
 def pick(table: pd.DataFrame, wish: Wish) -> tuple[pd.DataFrame, int]:
     """The episodes that a wish picks, and how many it might have picked; raises NothingToView."""
-    matching = _matching(table, wish)
-    seen = matching[matching["length"] > 0]
+    alike = matching(table, wish)
+    seen = alike[alike["length"] > 0]
     if seen.empty:
-        unseen = "; the agent failed before their first step" if len(matching) else ""
-        raise NothingToView(f"of {len(table)} episodes {len(matching)} are as asked for{unseen}")
+        unseen = "; the agent failed before their first step" if len(alike) else ""
+        raise NothingToView(f"of {len(table)} episodes {len(alike)} are as asked for{unseen}")
     if wish.worst is None and wish.best is None:
         return seen.head(LIMIT), len(seen)
     worst = seen.sort_values("score", kind="stable").head(wish.worst or 0)
@@ -92,8 +92,8 @@ def pick(table: pd.DataFrame, wish: Wish) -> tuple[pd.DataFrame, int]:
     return picked[~picked.index.duplicated()], len(seen)
 
 
-def _matching(table: pd.DataFrame, wish: Wish) -> pd.DataFrame:
-    """The episodes of the runs, on the splits and with the ends that are wished for."""
+def matching(table: pd.DataFrame, wish: Wish) -> pd.DataFrame:
+    """The episodes of the runs, on the splits and with the ends that are wished for; raises NothingToView."""
     found = table
     for name in ("method", "reaches", "split", "seed", "row", "cause"):
         if wanted := getattr(wish, name):

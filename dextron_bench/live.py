@@ -8,8 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
+from dextron_bench import methods, weights
 from dextron_bench.experts import Expert, ExpertAgent
-from dextron_bench.rollout import Agent, Case, Episode, Privileged, rollout
+from dextron_bench.learning import Heir, Learner
+from dextron_bench.rollout import Agent, Case, Episode, Privileged, blaming, rollout
 from dextron_bench.success.insight import Insight
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.world import model as world
@@ -37,6 +39,23 @@ def play(
     ((_, episode),) = rollout(watched, source, [case], slots=1, threads=1)
     audience.close(episode.actions, watched.insight, episode.success)
     return episode
+
+
+def performer(name: str, reaches: str, seed: int = 0) -> tuple[str, Agent]:
+    """The agent that a name stands for: a row of the leaderboard whose weights ship, or its beginning; or a method.
+
+    Raises MissingWeights, UnknownMethod, BadSettings, AgentError.
+    """
+    ships = {file.parts[-3]: file for file in weights.everything(reaches) if file.stem == f"seed{seed}"}
+    if label := next((label for label in ships if label == name or label.startswith(f"{name}-")), None):
+        return label, weights.own(ships[label])
+    method = methods.create(name, reaches=reaches)
+    if isinstance(method, Learner | Heir):
+        raise weights.MissingWeights(
+            f"no weights of {name!r} ship for {reaches} reaches and seed {seed}; there are {', '.join(ships) or 'none'}"
+        )
+    with blaming(f"agent({seed}) of method {name!r}"):
+        return methods.label(method), method.agent(seed)
 
 
 class _Watched:

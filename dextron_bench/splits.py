@@ -22,6 +22,10 @@ NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "open")
 EVALUATED = ("test", "unseen-reach", "unseen-subject")
 
 
+class UnknownRow(LookupError):
+    """A row that a split does not have."""
+
+
 class UnknownSplit(KeyError):
     """A split that a source of reaches does not have."""
 
@@ -45,6 +49,12 @@ class Split:
     reaches: str
     cases: tuple[Case, ...]
     digest: str
+
+    def case(self, row: int) -> Case:
+        """The case of a row; raises UnknownRow."""
+        if not 0 <= row < len(self.cases):
+            raise UnknownRow(f"{self.name} of {self.reaches} reaches has rows 0 to {len(self.cases) - 1}, not {row}")
+        return self.cases[row]
 
 
 def known(reaches: str) -> tuple[str, ...]:

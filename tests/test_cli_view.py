@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
+import opinion
 import pandas as pd
 import pytest
+import rerun as rr
 import tiny
 
 from dextron_bench import cli, recording
+from dextron_bench.success import network
 
 NOTHING = "runs/nothing/synthetic/seed0"
 
@@ -98,3 +102,40 @@ def test_what_cannot_be_opened_is_one_line(here: Path, opened: list[str], compla
     table.write_bytes(b"")
     assert f"{NOTHING}/episodes.parquet is damaged" in complaint("view", "--worst", "1")
     assert opened == []
+
+
+def test_two_runs_are_put_side_by_side_on_a_row_that_only_one_solves(here: Path, opened: list[str]):
+    assert cli.main(["view", "--diff", "runs/exp", NOTHING]) == 0
+    assert opened == ["runs/pairs/exp-0--nothing-0--test-0000.rrd"]
+    assert cli.main(["view", "--diff", "runs/exp", NOTHING, "--row", "1"]) == 0
+    assert opened[1] == "runs/pairs/exp-0--nothing-0--test-0001.rrd"
+    files = ["runs/exp/synthetic/seed0/recordings/test-0000.rrd", f"{NOTHING}/recordings/test-0000.rrd"]
+    assert cli.main(["view", "--diff", *files]) == 0
+    assert len(opened) == 3
+
+
+def test_what_cannot_be_side_by_side_is_one_line(here: Path, complaint: Callable[..., str]):
+    assert "--diff takes two places" in complaint("view", "--diff", "runs/exp")
+    assert "no episode has row 7" in complaint("view", "--diff", "runs/exp", NOTHING, "--row", "7")
+
+
+def test_a_policy_at_work_is_watched(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
+):
+    @contextmanager
+    def theatre() -> Iterator[tuple[Callable[[rr.RecordingStream], None], Callable[[], int]]]:
+        yield lambda stream: stream.save(here / "live.rrd"), lambda: 0
+
+    monkeypatch.setattr(recording, "theatre", theatre)
+    monkeypatch.setattr(network, "shipped", lambda reaches: opinion.model(0.5))
+    capsys.readouterr()
+    assert cli.main(["view", "--live", "--method", "nothing", "--row", "1", "--speed", "0"]) == 0
+    assert capsys.readouterr().out == "nothing on row 1 of test: 0 of 20\n"
+    assert (here / "live.rrd").stat().st_size > 100_000
+    assert "takes one --method" in complaint("view", "--live")
+    assert "no weights of 'rl' ship for synthetic reaches and seed 7" in complaint(
+        "view", "--live", "--method", "rl", "--seed", "7"
+    )
+    assert "test of synthetic reaches has rows 0 to 1, not 9" in complaint(
+        "view", "--live", "--method", "exp", "--row", "9"
+    )

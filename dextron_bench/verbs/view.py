@@ -26,7 +26,14 @@ class View:
     the first five where neither --worst nor --best says how many; what is not recorded yet is played again
     from the actions that were taken, and recorded in its run's folder.
 
+    With --diff two agents are put side by side on the same setting: two recordings, or two runs, of which the first row
+    that one solves and the other does not is taken. With --live a policy plays while you watch, on --row of --split.
+
     Example: dextron-bench view runs/exp/synthetic/seed0
+
+    Example: dextron-bench view --live --method rlil --reaches synthetic
+
+    Example: dextron-bench view --diff runs/bc-quick/real/seed0 runs/rlil-0.1-quick/real/seed0
 
     Example: dextron-bench view --worst 5 --method rlil-0.1 --reaches real --split unseen-subject --seed 0
     """
@@ -51,6 +58,12 @@ class View:
     """Pick among episodes that ended so, as in "too late"; docs/diagnosis.md has all causes."""
     row: tuple[int, ...] = ()
     """Pick among these rows of the splits."""
+    diff: bool = False
+    """Put the two places side by side."""
+    live: bool = False
+    """Watch the --method, called as on the leaderboard or as in `list`, at work with the weights that ship."""
+    speed: float = 1.0
+    """How fast it plays, of real time."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     print: bool = False
@@ -59,14 +72,49 @@ class View:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench import gallery, recording
+        from dextron_bench import recording
 
+        if self.live:
+            return self._perform()
         places, wish = self.place or (self.runs,), self._wish()
-        files = gallery.recordings(places) if wish == gallery.Wish() else self._picked(places, wish)
+        files = [self._side_by_side(wish)] if self.diff else self._found(places, wish)
         if self.print:
             print(*files, sep="\n")
         else:
             recording.view(files)
+        return 0
+
+    def _found(self, places: Sequence[Path], wish: Wish) -> list[Path]:
+        from dextron_bench import gallery
+
+        return gallery.recordings(places) if wish == gallery.Wish() else self._picked(places, wish)
+
+    def _side_by_side(self, wish: Wish) -> Path:
+        from dextron_bench import contrast, gallery
+
+        if len(self.place) != 2:
+            raise gallery.BadWish(f"--diff takes two places, recordings or runs; it got {len(self.place)}")
+        return contrast.contrast(*self.place, wish, self.runs)
+
+    def _perform(self) -> int:
+        from dextron_bench import gallery, live, recording, splits
+        from dextron_bench.success import network
+        from dextron_bench.world.sources import open_source
+
+        if len(self.method) != 1:
+            raise gallery.BadWish("--live takes one --method, such as rlil or exp")
+        reaches = self.reaches[0] if self.reaches else "synthetic"
+        label, agent = live.performer(self.method[0], reaches, self.seed[0] if self.seed else 0)
+        split = splits.load(reaches, self.split[0] if self.split else "test")
+        model, source = network.shipped(reaches), open_source(reaches)
+        with recording.theatre() as (connect, wait):
+            for row in self.row or (0,):
+                case = split.case(row)
+                about = {"method": label, "reaches": reaches, "split": split.name, "row": row}
+                stage = recording.Stage(connect, f"{label}, {split.name} {row}", source.path(case.setting), about)
+                episode = live.play(agent, source, case, model, stage, self.speed)
+                print(f"{label} on row {row} of {split.name}: {episode.score:g} of 20")
+            wait()
         return 0
 
     def _wish(self) -> Wish:
