@@ -19,7 +19,7 @@ from dextron_bench.success import judgement
 from dextron_bench.success.collection import POLICY, SOLVED, UNIFORM, BadCollection, Collection, Tally, collect, draw
 from dextron_bench.success.collection import file_of as block_file
 from dextron_bench.success.dataset import Dataset, EmptyDataset
-from dextron_bench.success.fit import MODEL, BadFit, Fit, fit
+from dextron_bench.success.fit import MODEL, STATE, BadFit, Fit, fit
 from dextron_bench.success.fit import network as fit_network
 from dextron_bench.success.network import GRID, SIZES, BadModel, MissingModel, SuccessModel, shipped
 
@@ -176,11 +176,30 @@ def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
         fit(tmp_path / "b", BRIEF, stop)
     fit(tmp_path / "b", BRIEF)
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
-    assert [point["epoch"] for point in tensors.read_about(tmp_path / "a" / MODEL)["curve"]] == [1, 2]
+    told = tensors.read_about(tmp_path / "a" / MODEL)
+    assert [point["epoch"] for point in told["curve"]] == [1, 2]
+    losses = [point["test_loss"] for point in told["curve"]]
+    assert losses[told["best_epoch"] - 1] == min(losses)
     with pytest.raises(records.RunMismatch, match="holds another training"):
         fit(tmp_path / "a", Fit(epochs=2, updates=4, batch=8))
     with pytest.raises(BadFit, match="positive"):
         Fit(updates=0)
+
+
+def test_the_model_is_that_of_the_epoch_with_the_lowest_loss_on_what_was_held_out(tmp_path: Path):
+    """Outcomes by chance, a few episodes: the longer it trains, the worse it foretells others."""
+    rng = np.random.default_rng(1)
+    arrays = {"states": rng.normal(size=(60, 48)).astype(np.float32), "actions": np.zeros(60, np.float32)}
+    arrays |= {"starts": np.arange(61), "solved": rng.integers(0, 2, 60).astype(np.uint8)}
+    tensors.write(block_file(tmp_path, 0), arrays, {})
+    long, short = (Fit(epochs=epochs, updates=20, batch=32) for epochs in (4, 1))
+    fit(tmp_path, long)
+    assert tensors.read_about(tmp_path / MODEL)["best_epoch"] == 1
+    best = tensors.read(tmp_path / MODEL)
+    (tmp_path / STATE).unlink()
+    fit(tmp_path, short)
+    for name, array in tensors.read(tmp_path / MODEL).items():
+        np.testing.assert_array_equal(array, best[name])
 
 
 def test_training_learns_what_can_be_learned(tmp_path: Path):

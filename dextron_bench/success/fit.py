@@ -50,8 +50,10 @@ class Fit:
 def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note: None) -> SuccessModel:
     """Trains on the data set in a folder, or goes on where a training there was stopped; returns the model.
 
-    The folder then holds it, with its learning curve: losses and accuracies on both halves after each epoch. The same
-    call ends with the same bytes, however often it was stopped. Raises RunMismatch, EmptyDataset, BadTensors.
+    It is that of the epoch with the lowest loss on the episodes held out, since later ones learn theirs by heart and
+    grow too sure. The folder then holds it, with its learning curve: losses and accuracies on both halves after each
+    epoch. The same call ends with the same bytes, however often it was stopped. Raises RunMismatch, EmptyDataset,
+    BadTensors.
     """
     lesson = _Lesson(folder, settings)
     file = folder / STATE
@@ -62,8 +64,8 @@ def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note:
         lesson.advance()
         tensors.write(file, lesson.state(), lesson.about())
     report(lesson.epoch, settings.epochs, lesson.note())
-    tensors.write(folder / MODEL, lesson.arrays(), lesson.about())
-    return SuccessModel(lesson.arrays())
+    tensors.write(folder / MODEL, lesson.best, lesson.about())
+    return SuccessModel(lesson.best)
 
 
 def curve(folder: Path) -> list[dict[str, float]]:
@@ -92,7 +94,7 @@ class _Lesson:
     def __init__(self, folder: Path, settings: Fit) -> None:
         self._folder, self._settings = folder, settings
         self._data, self._held = Dataset(folder), Dataset(folder, test=True)
-        self.epoch, self.curve = 0, list[dict[str, float]]()
+        self.epoch, self.curve, self.best = 0, list[dict[str, float]](), dict[str, np.ndarray]()
         states, _, _ = self._data.take(self._rng(1).integers(len(self._data), size=SCALED_BY))
         self._mean = states.mean(axis=0, dtype=np.float64)
         self._deviation = np.sqrt(states.var(axis=0, dtype=np.float64) + 1e-8)
@@ -119,6 +121,8 @@ class _Lesson:
         self.epoch += 1
         loss, accuracy = sums / settings.updates
         self.curve.append({"epoch": self.epoch, "loss": loss, "accuracy": accuracy} | self._test())
+        if self.best_epoch == self.epoch:
+            self.best = self.arrays()
 
     def _test(self) -> dict[str, float]:
         states, actions, outcomes = self._held.take(self._rng(3).integers(len(self._held), size=TESTED))
@@ -133,13 +137,19 @@ class _Lesson:
         scaled = np.clip((states - self._mean) / self._deviation, -CLIP, CLIP)
         return torch.tensor(np.concatenate([scaled, actions[:, None]], axis=1), dtype=torch.float32)
 
+    @property
+    def best_epoch(self) -> int:
+        """The epoch with the lowest loss on the episodes held out, so far."""
+        return int(min(self.curve, key=lambda point: point["test_loss"])["epoch"])
+
     def note(self) -> str:
         """How it goes."""
         return f"held-out accuracy {100 * self.curve[-1]['test_accuracy']:.1f} %" if self.curve else ""
 
     def about(self) -> dict[str, Any]:
         """What goes with the arrays."""
-        return {"fit": asdict(self._settings), "rows": len(self._data), "epoch": self.epoch, "curve": self.curve}
+        told = {"fit": asdict(self._settings), "rows": len(self._data), "epoch": self.epoch, "curve": self.curve}
+        return told | {"best_epoch": self.best_epoch}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Copies of what the model is made of."""
@@ -147,8 +157,8 @@ class _Lesson:
         return found | {"mean": self._mean, "deviation": self._deviation}
 
     def state(self) -> dict[str, np.ndarray]:
-        """The model and the optimiser's memory."""
-        found = self.arrays()
+        """The model as it is, and at its best, and the optimiser's memory."""
+        found = self.arrays() | {f"best.{name}": array for name, array in self.best.items()}
         for i, parameter in enumerate(self._parameters):
             memory = self._optimiser.state[parameter]
             found |= {f"adam.{i}.{name}": memory[name].numpy().copy() for name in MEMORY}
@@ -160,6 +170,7 @@ class _Lesson:
         if about.get("fit") != asdict(self._settings) or about.get("rows") != len(self._data):
             raise RunMismatch(f"{self._folder} holds another training; remove {file.name} there, or take its settings")
         self.epoch, self.curve = about["epoch"], about["curve"]
+        self.best = {name: arrays[f"best.{name}"] for name in self.arrays()}
         with torch.no_grad():
             for i, parameter in enumerate(self._parameters):
                 parameter.copy_(torch.tensor(arrays[f"layer.{i}"]))

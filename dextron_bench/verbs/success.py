@@ -80,14 +80,16 @@ class Train:
     """Show no progress."""
 
     def __call__(self) -> int:
+        from dextron_bench import tensors
         from dextron_bench.success import fit
 
         folder = folder_of(self.runs, self.reaches, self.data)
         with progress_bar("epochs", self.quiet) as progress:
             fit.fit(folder, fit.Fit(epochs=self.epochs, seed=self.seed), progress)
-        last = fit.curve(folder)[-1]
+        told = tensors.read_about(folder / fit.MODEL)
+        best = told["curve"][told["best_epoch"] - 1]
         columns = ["epoch", "loss", "accuracy", "test_loss", "test_accuracy"]
-        print_table("the last epoch", columns, [[last[column] for column in columns]])
+        print_table("the best epoch on episodes held out", columns, [[best[column] for column in columns]])
         print(folder / fit.MODEL)
         return 0
 
