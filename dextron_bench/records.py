@@ -19,6 +19,7 @@ CONFIG = "config.json"
 PROVENANCE = "provenance.json"
 EPISODES = "episodes.parquet"
 RESULT = "result.json"
+MANIFEST = "recordings.json"  # The SHA-256 of every recording.
 
 
 class RunMismatch(ValueError):
@@ -112,13 +113,19 @@ def unrecorded(folder: Path, done: pd.DataFrame, record: int) -> bool:
 def record(
     folder: Path, source: setting.Source, split: splits.Split, index: int, episode: Episode, about: dict[str, Any]
 ) -> None:
-    """Writes an episode's recording: whose it is, in `about`, and what the success model that ships thinks of it."""
+    """Writes an episode's recording: whose it is, in `about`, and what the success model that ships thinks of it.
+
+    The run's manifest then has the file's SHA-256.
+    """
     from dextron_bench import recording
 
     properties = {**about, "split": split.name, "split_digest": split.digest, "row": index}
     properties["physics"] = model.mjcf_hash()
     file, path = recording_file(folder, split.name, index), source.path(episode.setting)
-    recording.write(file, episode, path, properties, _insight(source, split.cases[index], episode))
+    sha256 = recording.write(file, episode, path, properties, _insight(source, split.cases[index], episode))
+    manifest = folder / MANIFEST
+    known = read_json(manifest) if manifest.exists() else {}
+    provenance.write_json(manifest, known | {file.name: sha256})
 
 
 def recording_file(folder: Path, split: str, index: int) -> Path:

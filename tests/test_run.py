@@ -140,7 +140,8 @@ def test_actions_that_end_before_the_episode_fail_it():
 def test_a_recording_reads_back_as_the_episode(tmp_path: Path):
     folder = play(tmp_path, Plan("exp", "synthetic", ("test",), seed=3, record=1))
     assert [file.name for file in (folder / "recordings").iterdir()] == ["test-0000.rrd"]
-    recorded = recording.read(folder / "recordings" / "test-0000.rrd")
+    manifest = json.loads((folder / "recordings.json").read_text())
+    recorded = recording.read(folder / "recordings" / "test-0000.rrd", sha256=manifest["test-0000.rrd"])
     split = splits.load("synthetic", "test")
     _, episode = next(iter(rollout(ExpertAgent(), tiny.SOURCE, split.cases[:1], threads=1)))
     assert recorded.episode.setting == split.cases[0].setting

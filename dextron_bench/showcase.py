@@ -1,0 +1,66 @@
+"""A small choice of recordings that shows what there is: each method at its best and worst, and the success model."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+
+from dextron_bench import diagnosis, gallery, provenance, restoration, splits
+from dextron_bench.replay import replay
+from dextron_bench.success import explanation, network
+from dextron_bench.success.explanation import EXPERT, Foresight
+from dextron_bench.world import sources
+from dextron_bench.world.setting import from_frame
+
+EXPERTS = "exp"  # The method that plays experts.
+
+
+def choose(runs: Path, reaches: str, split: str, rows: int) -> pd.DataFrame:
+    """The chosen ones of the first rows of a split that runs played, each with its `name`.
+
+    Raises NothingToView, DamagedRun, MissingModel, MissingData.
+    """
+    table = gallery.episodes([runs])
+    known = table[(table["reaches"] == reaches) & (table["split"] == split) & (table["row"] < rows)]
+    known = known[(known["length"] > 0) & (known["seed"] == known.groupby("method")["seed"].transform("min"))]
+    if known.empty:
+        raise gallery.NothingToView(f"no run in {runs} played {split} of {reaches} reaches; `dextron-bench run` does")
+    return pd.concat([*_ends(known), *_kinds(known, reaches, split)], ignore_index=True)
+
+
+def make(chosen: pd.DataFrame, into: Path) -> list[Path]:
+    """Copies the recordings of chosen episodes, made where they are missing, to `<name>.rrd` in a folder."""
+    files = [into / f"{name}.rrd" for name in chosen["name"]]
+    for file, recorded in zip(files, restoration.restore(chosen), strict=True):
+        provenance.write_whole(file, lambda part, recorded=recorded: shutil.copyfile(recorded, part))
+    return files
+
+
+def _ends(known: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    """The shortest success and the shortest failure of every method."""
+    for method, own in known.groupby("method"):
+        for success, word in ((True, "success"), (False, "failure")):
+            found = own[own["success"] == success].sort_values("length", kind="stable").head(1)
+            yield found.assign(name=f"{method}-{word}")
+
+
+def _kinds(known: pd.DataFrame, reaches: str, split: str) -> Iterator[pd.DataFrame]:
+    """The clearest episode of each of the five kinds that explain the success model."""
+    for kind, seen in explanation.choose(_foreseen(known, reaches, split)).items():
+        method = EXPERTS if seen.player == EXPERT else seen.player
+        own = known[known["method"] == method]
+        mine = [setting == seen.episode.setting for setting in from_frame(own)]
+        yield own[mine].head(1).assign(name=f"case-{kind}")
+
+
+def _foreseen(known: pd.DataFrame, reaches: str, split: str) -> Iterator[Foresight]:
+    """All episodes, played again, as the model that ships foretells them."""
+    model, source, cases = network.shipped(reaches), sources.open_source(reaches), splits.load(reaches, split).cases
+    kept = known[known["actions"].notna()] if "actions" in known else known.head(0)
+    for place, episode in sorted(replay(source, from_frame(kept), kept["actions"].tolist()), key=lambda each: each[0]):
+        row = kept.iloc[place]
+        player = EXPERT if row["method"] == EXPERTS else str(row["method"])
+        yield explanation.foresee(model, source, player, episode, diagnosis.diagnose(episode, cases[row["row"]]))
