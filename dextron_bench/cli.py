@@ -24,6 +24,7 @@ from dextron_bench.verbs import (
     foretelling,
     leaderboard,
     mc,
+    recordings,
     run,
     settings,
     splits,
@@ -50,6 +51,10 @@ VERBS: dict[str, type[Verb] | Group] = {
         {"show": leaderboard.Show, "build": leaderboard.Build},
     ),
     "view": view.View,
+    "recordings": (
+        "Recordings: list them, export one as a film or a table.",
+        {"list": recordings.List, "export": recordings.Export},
+    ),
     "list": listing.List,
     "data": (
         "Reaches: import or fetch the recorded ones, see what a source holds, fit and judge the synthetic ones; "

@@ -267,6 +267,8 @@ def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
         ["leaderboard", "show"],
         ["leaderboard", "build"],
         ["view"],
+        ["recordings", "list"],
+        ["recordings", "export"],
         ["splits"],
         ["mc"],
         ["run"],

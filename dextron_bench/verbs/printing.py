@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+WIDE = 1000  # Columns that a table may take off a terminal, where nothing is folded for want of room.
 RATE_OVER = 300.0  # [s] over which rate and time left are estimated; a search's blocks take up to a minute.
 
 
@@ -23,7 +24,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[obje
         table.add_column(column, justify="right" if numbers else "left", overflow="fold")
     for row in rows:
         table.add_row(*(f"{cell:.3f}" if isinstance(cell, float) else str(cell) for cell in row))
-    console = Console(soft_wrap=not sys.stdout.isatty(), markup=False)
+    console = Console(width=None if sys.stdout.isatty() else WIDE, soft_wrap=not sys.stdout.isatty(), markup=False)
     with console.capture() as captured:  # Rich itself would end the process where a reader has left.
         console.print(table)
     print(captured.get(), end="")

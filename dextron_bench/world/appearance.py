@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from ctypes.util import find_library
 from dataclasses import dataclass
 from importlib import import_module
@@ -19,7 +20,7 @@ INSTALL = (
     "install EGL (Debian: apt install libegl1 libgl1-mesa-dri) or OSMesa (apt install libosmesa6), "
     "and set MUJOCO_GL to egl or osmesa"
 )
-SUPERSAMPLING = 2  # Pixels are rendered this many times smaller than they come out.
+SUPERSAMPLING = 2  # Pixels of stills are rendered this many times smaller than they come out.
 LIGHT_RADIUS = 0.35  # [m] of the lamp that throws soft shadows.
 
 
@@ -71,21 +72,27 @@ def frames(
     """Pictures (T, height, width, 3) uint8 of states (T, 48); raises as `render`."""
     if camera not in CAMERAS:
         raise UnknownCamera(camera)
-    with Painter(width * SUPERSAMPLING, height * SUPERSAMPLING) as painter:
+    with Painter(width, height) as painter:
         return np.stack([painter.paint(state, CAMERAS[camera], lights) for state in states])
 
 
 class Painter:
     """An off-screen picture of fixed size, to be painted again and again; free it with `with`."""
 
-    def __init__(self, width: int, height: int) -> None:
-        """Takes the size in rendered pixels; raises NoGraphics."""
-        self._size = width, height
+    def __init__(self, width: int, height: int, supersampling: int = SUPERSAMPLING) -> None:
+        """Takes the size of pictures [pixels] and how many times finer they are rendered; raises NoGraphics."""
+        self._finer = supersampling
+        self._size = width, height = width * supersampling, height * supersampling
         self._model = dressing.dressed()
         self._data = mujoco.MjData(self._model)
-        self._context = context(width, height)
-        self._context.make_current()
-        self._graphics = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        with warnings.catch_warnings(action="ignore"):  # GLFW says by them what the errors below do.
+            self._context = context(width, height)
+            self._context.make_current()
+        try:
+            self._graphics = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        except mujoco.FatalError as error:
+            raise NoGraphics(f"cannot draw off screen: {error}; {INSTALL}") from error
+        mujoco.mjr_resizeOffscreen(width, height, self._graphics)  # A larger one costs time in every picture.
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._graphics)
         self._scene = mujoco.MjvScene(self._model, maxgeom=1000)
         self._option = mujoco.MjvOption()
@@ -97,8 +104,8 @@ class Painter:
         self._graphics.free()
         self._context.free()
 
-    def paint(self, state: np.ndarray, camera: Camera, lights: int) -> np.ndarray:
-        """A picture, averaged over so many places of the key light, SUPERSAMPLING times smaller than rendered."""
+    def paint(self, state: np.ndarray, camera: Camera, lights: int = 1) -> np.ndarray:
+        """A picture, averaged over so many places of the key light."""
         self._data.qpos[:] = state[: self._model.nq]
         mujoco.mj_forward(self._model, self._data)
         key = self._model.light("key").id
@@ -108,7 +115,7 @@ class Painter:
             self._data.light_xpos[key] = home + shift
             total += self._shot(camera)
         picture = total / lights
-        n = SUPERSAMPLING
+        n = self._finer
         rows = picture[::-1].reshape(self._size[1] // n, n, self._size[0] // n, n, 3)
         return np.round(rows.mean(axis=(1, 3))).astype(np.uint8)
 

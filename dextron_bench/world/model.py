@@ -21,6 +21,7 @@ BOTTLE_POSITION = slice(0, 3)
 BOTTLE_QUATERNION = slice(3, 7)
 PALM_POSITION = slice(7, 10)
 PALM_QUATERNION = slice(10, 14)
+FREE_PLACE, FREE_SPEED = ("x", "y", "z", "qw", "qx", "qy", "qz"), ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 def mjcf() -> str:
@@ -71,6 +72,21 @@ def half_closed() -> np.ndarray:
         qpos[model.joint(f"{digit}_distal").qposadr] = close * coupling
     qpos[model.joint("thumb_base").qposadr] = THUMB_OPPOSED
     return _frozen(qpos)
+
+
+@cache
+def state_names() -> tuple[str, ...]:
+    """Names of the numbers in a state, (48,): where things are, then how fast they move.
+
+    Positions are in [m], quaternions wxyz, angles in [rad]. Free bodies' velocities `vx` to `vz` are the world's [m/s],
+    `wx` to `wz` those about the body's own axes [rad/s].
+    """
+    places, speeds = [], []
+    for joint in map(load().joint, range(load().njnt)):  # In the order of their addresses.
+        free = joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
+        places += [f"{joint.name}_{axis}" for axis in FREE_PLACE] if free else [joint.name]
+        speeds += [f"{joint.name}_{axis}" for axis in FREE_SPEED] if free else [f"{joint.name}_velocity"]
+    return (*places, *speeds)
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

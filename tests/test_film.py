@@ -1,0 +1,117 @@
+"""Films: in real time, of the states that they are of, and a line where they cannot be."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from dextron_bench import film
+from dextron_bench.film import BadLook, Look, NoEncoder
+from dextron_bench.world import appearance, model
+
+SMALL = Look(64, 48)
+
+
+def lifting(count: int) -> np.ndarray:
+    """States (count, 48) in which the bottle rises."""
+    states = np.tile(np.concatenate([model.half_closed(), np.zeros(23)]), (count, 1))
+    states[:, 2] += np.linspace(0.0, 0.2, count)
+    return states
+
+
+def pictures(file: Path) -> tuple[list[np.ndarray], float]:
+    """The pictures of a film, and how long it takes [s]."""
+    if file.suffix == ".gif":
+        image, shown, lasts = Image.open(file), [], 0.0
+        for k in range(getattr(image, "n_frames", 1)):
+            image.seek(k)
+            shown.append(np.asarray(image.convert("RGB")))
+            lasts += image.info["duration"] / 1000
+        return shown, lasts
+    with av.open(str(file)) as film:
+        assert film.duration
+        return [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)], film.duration / 1e6
+
+
+@pytest.mark.parametrize(
+    ("count", "rate", "speed", "shown", "fps"),
+    [
+        (5, 50.0, 1.0, [0, 1, 2, 3, 4], 50.0),
+        (5, 25.0, 1.0, [0, 2, 4], 25.0),
+        (6, 25.0, 1.0, [0, 2, 4, 5], 25.0),  # The last state, whatever the stride.
+        (4, 25.0, 0.5, [0, 1, 2, 3], 25.0),
+        (3, 50.0, 0.25, [0, 1, 2], 12.5),
+        (11, 50.0, 5.0, [0, 5, 10], 50.0),
+        (8, 50.0, 1.5, [0, 1, 3, 4, 6, 7], 50.0),
+        (2, 50.0, 20.0, [0, 1], 50.0),
+        (1, 50.0, 1.0, [0], 50.0),
+    ],
+)
+def test_a_film_shows_these_steps_at_this_rate(count: int, rate: float, speed: float, shown: list[int], fps: float):
+    assert film.steps(count, rate, speed) == (shown, pytest.approx(fps))
+
+
+@pytest.mark.parametrize(("write", "count"), [(film.mp4, 26), (film.gif, 14)])
+def test_a_film_takes_as_long_as_the_episode_and_shows_it(tmp_path: Path, write: Callable[..., None], count: int):
+    file, told = tmp_path / f"film.{write.__name__}", []
+    write(file, lifting(26), SMALL, lambda *parts: told.append(parts))
+    shown, lasts = pictures(file)
+    assert told == [(k + 1, count) for k in range(count)]
+    assert len(shown) == count
+    assert lasts == pytest.approx(0.52, abs=0.041)  # 26 states, 0.02 s each.
+    drawn = appearance.frames(lifting(26)[[0, -1]], 64, 48)
+    for picture, state in zip((shown[0], shown[-1]), drawn, strict=True):
+        assert np.abs(picture.astype(int) - state).mean() < 6.0
+    assert np.abs(shown[0].astype(int) - shown[-1]).mean() > 0.5
+
+
+def test_slow_motion_takes_longer(tmp_path: Path):
+    film.gif(tmp_path / "slow.gif", lifting(4), Look(64, 48, speed=0.3), lambda done, total: None)
+    shown, lasts = pictures(tmp_path / "slow.gif")
+    assert (len(shown), lasts) == (4, pytest.approx(0.27))  # 4 at 15 a second; a GIF counts hundredths.
+
+
+@pytest.mark.parametrize(
+    ("look", "told"),
+    [
+        ({"width": 641}, "width 641: films have an even number of pixels from 16 to 2160 a side"),
+        ({"height": 8}, "height 8: films"),
+        ({"width": 4000}, "width 4000: films"),
+        ({"speed": 0.0}, "speed 0: choose from 0.02 to 50 times life's"),
+        ({"speed": float("nan")}, "speed nan"),
+    ],
+)
+def test_a_film_that_cannot_be_is_told(look: dict[str, float], told: str):
+    with pytest.raises(BadLook) as caught:
+        Look(**look)  # pyright: ignore[reportArgumentType]
+    assert str(caught.value).startswith(told)
+
+
+def test_an_unknown_camera_names_the_known():
+    with pytest.raises(appearance.UnknownCamera, match="no camera 'left'; choose from behind, front"):
+        Look(camera="left")
+
+
+def test_without_an_encoder_the_line_says_how_to_get_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(NoEncoder, match=r"pip install 'dextron-bench\[video\]'; or write a \.gif"):
+        film.mp4(tmp_path / "film.mp4", lifting(3), SMALL, lambda done, total: None)
+
+
+@pytest.mark.parametrize("write", [film.mp4, film.gif])
+def test_without_graphics_nothing_else_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], write: Callable[..., None]
+):
+    for kind in ("disabled", "glfw"):
+        monkeypatch.setenv("MUJOCO_GL", kind)
+        monkeypatch.delenv("DISPLAY", raising=False)
+        monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+        with pytest.raises(appearance.NoGraphics, match="cannot draw off screen"):
+            write(tmp_path / "film", lifting(3), SMALL, lambda done, total: None)
+    assert capfd.readouterr() == ("", "")
