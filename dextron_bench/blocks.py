@@ -44,6 +44,12 @@ def claim(search: dict[str, Any], folder: Path) -> None:
         raise SearchMismatch(f"{folder} holds another search ({found}); choose another folder, or remove it")
 
 
+def claimed(folder: Path) -> dict[str, Any]:
+    """Which search, under which physics, a folder was claimed for; empty where it was for none."""
+    file = folder / "search.json"
+    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+
+
 def write(folder: Path, number: int, draws: pd.DataFrame) -> None:
     """Puts a block in store, whole."""
     provenance.write_whole(file_of(folder, number), lambda part: draws.to_parquet(part, compression="zstd"))

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from dextron_bench import tensors
+from dextron_bench import blocks, tensors
 from dextron_bench.records import RunMismatch
 from dextron_bench.success.dataset import Dataset
 from dextron_bench.success.network import CLIP, SIZES, SuccessModel
@@ -149,7 +149,7 @@ class _Lesson:
     def about(self) -> dict[str, Any]:
         """What goes with the arrays."""
         told = {"fit": asdict(self._settings), "rows": len(self._data), "epoch": self.epoch, "curve": self.curve}
-        return told | {"best_epoch": self.best_epoch}
+        return told | {"best_epoch": self.best_epoch, "data": blocks.claimed(self._folder)}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Copies of what the model is made of."""
