@@ -27,6 +27,7 @@ from dextron_bench.verbs import (
     recordings,
     run,
     settings,
+    showcase,
     splits,
     success,
     view,
@@ -52,8 +53,8 @@ VERBS: dict[str, type[Verb] | Group] = {
     ),
     "view": view.View,
     "recordings": (
-        "Recordings: list them, export one as a film or a table.",
-        {"list": recordings.List, "export": recordings.Export},
+        "Recordings: list them, export one as a film or a table, choose a few of the runs'.",
+        {"list": recordings.List, "export": recordings.Export, "choose": showcase.Choose},
     ),
     "list": listing.List,
     "data": (
