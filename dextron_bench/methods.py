@@ -7,12 +7,13 @@ import importlib
 import importlib.util
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, fields, is_dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ClassVar, Protocol, TypeAlias
+from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 from dextron_bench.learning import Heir, Learner
 from dextron_bench.rollout import Agent, AgentError, blaming
@@ -38,6 +39,15 @@ class Method(Protocol):
 
     def agent(self, seed: int) -> Agent:
         """An agent ready to act; equal seeds give agents that act equally."""
+        ...
+
+
+@runtime_checkable
+class Situated(Protocol):
+    """A method that acts by what is known of its source of reaches, as OMEGA does by a model of success there."""
+
+    def made_for(self, reaches: str) -> Method:
+        """The method as it acts on that source; its settings, with which it can be made again, say by what."""
         ...
 
 
@@ -74,17 +84,17 @@ def find(spec: str) -> type[Entrant]:
     return _checked(spec, getattr(module, name, None))
 
 
-def create(spec: str, settings: Mapping[str, Any] | None = None) -> Entrant:
-    """The method with these settings, defaults elsewhere; raises UnknownMethod, BadSettings, AgentError."""
+def create(spec: str, settings: Mapping[str, Any] | None = None, reaches: str = "") -> Entrant:
+    """The method with these settings, defaults elsewhere, for a source of reaches where one is named.
+
+    Raises UnknownMethod, BadSettings, AgentError.
+    """
     found = find(spec)
-    try:
-        with blaming(f"making method {spec!r}"):
-            made = found(**(settings or {}))
-            called = label(made)
-    except AgentError as error:
-        if isinstance(error.__cause__, ValueError):
-            raise BadSettings(f"method {spec!r}: {error.__cause__}") from error
-        raise
+    with _making(spec):
+        made = found(**(settings or {}))
+        if reaches and isinstance(made, Situated):
+            made = made.made_for(reaches)
+        called = label(made)
     if not isinstance(called, str) or not NAME.fullmatch(called):
         raise UnknownMethod(f"{spec!r} has the label {called!r}: use letters, digits and . _ + -, as in 'rlil-0.1'")
     return made
@@ -138,6 +148,18 @@ def describe(name: str) -> str:
 def settings(method: Entrant) -> dict[str, Any]:
     """A method's settings as plain values."""
     return asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
+
+
+@contextmanager
+def _making(spec: str) -> Iterator[None]:
+    """Makes an entrant's ValueError BadSettings, and what else its code raises an AgentError."""
+    try:
+        with blaming(f"making method {spec!r}"):
+            yield
+    except AgentError as error:
+        if isinstance(error.__cause__, ValueError):
+            raise BadSettings(f"method {spec!r}: {error.__cause__}") from error
+        raise
 
 
 def _checked(spec: str, found: Any) -> type[Entrant]:

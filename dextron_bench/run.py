@@ -34,8 +34,8 @@ class Plan:
     weights: Path | None = None
 
     def make(self) -> Entrant:
-        """The method; raises UnknownMethod, BadSettings, AgentError."""
-        return methods.create(self.method, self.settings)
+        """The method for its source of reaches; raises UnknownMethod, BadSettings, AgentError."""
+        return methods.create(self.method, self.settings, self.reaches)
 
     def folder(self, runs: Path) -> Path:
         """Where the run lives."""

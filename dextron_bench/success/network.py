@@ -81,6 +81,12 @@ def told(reaches: str) -> dict[str, Any]:
         return tensors.read_about(file)
 
 
+def digest(reaches: str) -> str:
+    """The SHA-256 of the file of the model that ships, hexadecimal; raises MissingModel."""
+    with as_file(_place(reaches)) as file:
+        return tensors.sha256(file)
+
+
 def _place(reaches: str) -> Traversable:
     place = files("dextron_bench") / "data" / f"success-{reaches}.safetensors"
     if not place.is_file():
