@@ -5,7 +5,6 @@ The only package that talks to Rerun.
 
 from dextron_bench.recording.archive import BrokenRecording, Recorded, UnwritableRecording, Value, read, write
 from dextron_bench.recording.pair import UnequalSettings, pair
-from dextron_bench.recording.probe import probe
 from dextron_bench.recording.properties import ReaderError, Summary, read_safely, summarise
 from dextron_bench.recording.stage import Stage, theatre
 from dextron_bench.recording.viewer import ViewerError, screenshots, view
@@ -21,7 +20,6 @@ __all__ = [
     "Value",
     "ViewerError",
     "pair",
-    "probe",
     "read",
     "read_safely",
     "screenshots",

@@ -99,8 +99,8 @@ def save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blue
 def read(file: Path, sha256: str | None = None) -> Recorded:
     """The episode in `file`, its arrays bit for bit as they were written; raises BrokenRecording.
 
-    The file's SHA-256, if given, is checked before anything is decoded; without it `probe` comes first
-    where a file may be damaged, since Rerun's decoder can abort the process.
+    The file's SHA-256, if given, is checked before anything is decoded; without it `read_safely` is for files
+    that may be damaged, since Rerun's decoder can abort the process.
     """
     chunks = _load(file, sha256)
     kept = [chunk for chunk in chunks if chunk.entity_path != "/__properties/digest"]
@@ -110,9 +110,13 @@ def read(file: Path, sha256: str | None = None) -> Recorded:
     if told != digest(lines(kept)):
         raise BrokenRecording(file, "its content does not match its digest; it was damaged or changed after writing")
     facts: dict[str, Any] = _properties(kept, "episode")
-    setting = Setting(*(facts[name] for name in Setting.__slots__))
-    arrays = {name: _array(kept, name) for name in ARRAYS}
-    episode = Episode(setting, **arrays, **{name: facts[name] for name in ENDS})
+    try:
+        setting = Setting(*(facts[name] for name in Setting.__slots__))
+        arrays = {name: _array(kept, name) for name in ARRAYS}
+        episode = Episode(setting, **arrays, **{name: facts[name] for name in ENDS})
+    except (KeyError, StopIteration) as error:
+        lacking = f"it lacks {error}" if isinstance(error, KeyError) else "it lacks an array"
+        raise BrokenRecording(file, f"is a recording of another version of {APPLICATION}: {lacking}") from error
     return Recorded(episode, _properties(kept, "run"))
 
 

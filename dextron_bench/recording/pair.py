@@ -11,6 +11,7 @@ from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench.recording import archive, layout, scene
 from dextron_bench.recording.archive import Recorded
+from dextron_bench.recording.properties import read_safely
 
 SIDES = "/a", "/b"
 PLOTS = {  # Title of each plot, what of each side is in it, and its range.
@@ -31,7 +32,7 @@ def pair(file: Path, first: Path, second: Path) -> Path:
 
     Raises BrokenRecording, UnequalSettings, UnwritableRecording. It is for looking: `read` takes single episodes.
     """
-    sides = [archive.read(each) for each in (first, second)]
+    sides = [read_safely(each) for each in (first, second)]
     if sides[0].episode.setting != sides[1].episode.setting:
         raise UnequalSettings(
             f"{first} and {second} are of other settings; take two of the same row of the same split, as in "
