@@ -16,6 +16,7 @@ from dextron_bench.world import sources
 from dextron_bench.world.setting import from_frame
 
 EXPERTS = "exp"  # The method that plays experts.
+FLOORS = "nothing", "random"  # Methods that decide nothing, so that there is nothing to explain.
 
 
 def choose(runs: Path, reaches: str, split: str, rows: int) -> pd.DataFrame:
@@ -24,8 +25,13 @@ def choose(runs: Path, reaches: str, split: str, rows: int) -> pd.DataFrame:
     Raises NothingToView, DamagedRun, MissingModel, MissingData.
     """
     table = gallery.episodes([runs])
+    table = table.assign(actions=table.get("actions"))  # Runs of earlier versions kept none.
     known = table[(table["reaches"] == reaches) & (table["split"] == split) & (table["row"] < rows)]
-    known = known[(known["length"] > 0) & (known["seed"] == known.groupby("method")["seed"].transform("min"))]
+    known = known[
+        (known["length"] > 0)
+        & known["actions"].notna()
+        & (known["seed"] == known.groupby("method")["seed"].transform("min"))
+    ]
     if known.empty:
         raise gallery.NothingToView(f"no run in {runs} played {split} of {reaches} reaches; `dextron-bench run` does")
     return pd.concat([*_ends(known), *_kinds(known, reaches, split)], ignore_index=True)
@@ -59,7 +65,7 @@ def _kinds(known: pd.DataFrame, reaches: str, split: str) -> Iterator[pd.DataFra
 def _foreseen(known: pd.DataFrame, reaches: str, split: str) -> Iterator[Foresight]:
     """All episodes, played again, as the model that ships foretells them."""
     model, source, cases = network.shipped(reaches), sources.open_source(reaches), splits.load(reaches, split).cases
-    kept = known[known["actions"].notna()] if "actions" in known else known.head(0)
+    kept = known[~known["method"].isin(FLOORS)]
     for place, episode in sorted(replay(source, from_frame(kept), kept["actions"].tolist()), key=lambda each: each[0]):
         row = kept.iloc[place]
         player = EXPERT if row["method"] == EXPERTS else str(row["method"])

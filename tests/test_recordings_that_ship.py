@@ -1,0 +1,41 @@
+"""The recordings in `recordings/`: whole, small together, and played again from their own actions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dextron_bench import recording
+from dextron_bench.replay import replay
+from dextron_bench.world import model, sources
+
+FOLDER = Path(__file__).parents[1] / "recordings"
+FILES = sorted(FOLDER.glob("*.rrd"))
+KINDS = {"fading", "early", "expert", "policy", "wrong"}
+
+
+def test_they_are_few_and_small():
+    assert sum(file.stat().st_size for file in FILES) < 10e6
+    assert {f"case-{kind}" for kind in KINDS} <= {file.stem for file in FILES}
+
+
+def test_all_are_whole_and_say_whose_they_are():
+    for summary in recording.summarise(FILES, whole=True):
+        assert not summary.damage, summary
+        assert summary.properties["reaches"] == "synthetic"
+        assert summary.properties["physics"] == model.mjcf_hash()
+        if not summary.file.stem.startswith("case-"):
+            method, _, outcome = summary.file.stem.rpartition("-")
+            assert summary.properties["method"] == method
+            assert (summary.properties["outcome"] == "success") == (outcome == "success")
+
+
+@pytest.mark.slow
+def test_their_actions_lead_to_the_same_end_again():
+    source = sources.open_source("synthetic")
+    episodes = [recording.read(file).episode for file in FILES]
+    settings, actions = zip(*((each.setting, each.actions[:, 0]) for each in episodes), strict=True)
+    for place, again in replay(source, settings, actions):
+        assert again.score == episodes[place].score
+        assert len(again.actions) == len(episodes[place].actions)
