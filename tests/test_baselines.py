@@ -12,14 +12,16 @@ import pytest
 from baselines.exp import Exp
 from baselines.floors import Nothing, Random
 from baselines.omega import OmegaAgent
+from baselines.reflex import BadDistance, Reflex
 from dextron_bench.experts import Expert
 from dextron_bench.rollout import Agent, Privileged
-from dextron_bench.world import model
+from dextron_bench.world import model, task
 
 KINDS: dict[str, Callable[[], Agent]] = {  # The agents of methods that need no training.
     "exp": lambda: Exp().agent(0),
     "nothing": lambda: Nothing().agent(0),
     "omega": lambda: OmegaAgent(opinion.model(0.4), 0.02, 0.08),
+    "reflex": lambda: Reflex().agent(0),
     "random": lambda: Random().agent(0),
 }
 
@@ -69,3 +71,12 @@ def test_a_floor_sends_nothing_and_the_other_uniform_noise():
     assert abs(noise.mean()) < 0.04  # 4 sigma of the mean is 0.037.
     assert noise.min() < -0.99
     assert noise.max() > 0.99
+
+
+def test_reflex_closes_within_its_distance_and_opens_beyond():
+    shown = states(1)
+    far = float(task.distance(shown)[0])
+    assert Reflex(near=far).agent(0).act(shown)[0, 0] == 1.0
+    assert Reflex(near=0.99 * far).agent(0).act(shown)[0, 0] == -1.0
+    with pytest.raises(BadDistance, match="0 or more"):
+        Reflex(near=float("nan"))
