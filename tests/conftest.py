@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 
 from dextron_bench import cli
+from dextron_bench.world.setting import Source
+from dextron_bench.world.sources import open_source
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes would otherwise take every core.
 
@@ -29,6 +31,18 @@ def release() -> Path:
     if not found.exists():
         pytest.skip("the authors' release is not here: set DEXTRON_DATA to its zip or folder")
     return found
+
+
+@pytest.fixture
+def opened(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Source]:
+    """Opens a source of reaches by name; `real` reads the authors' release, or skips."""
+
+    def opened(reaches: str) -> Source:
+        if reaches == "real":
+            monkeypatch.setenv("DEXTRON_DATA", str(request.getfixturevalue("release")))
+        return open_source(reaches)
+
+    return opened
 
 
 @dataclass(frozen=True)

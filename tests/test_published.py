@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 import baselines
 from dextron_bench import cli, lessons, methods, records, rollout, splits, tensors, weights
 from dextron_bench.learning import Learner
-from dextron_bench.world import sources
+from dextron_bench.world.setting import Source
 
 BOARD = Path(__file__).parents[1] / "leaderboard"
 RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))
@@ -58,15 +59,13 @@ def test_weights_that_ship_are_those_of_the_result(file: Path):
         *(pytest.param(file, 50, id=f"{name(file)}-50", marks=pytest.mark.slow) for file in WEIGHTS),
     ],
 )
-def test_weights_that_ship_score_what_was_published(file: Path, rows: int, request: pytest.FixtureRequest):
+def test_weights_that_ship_score_what_was_published(file: Path, rows: int, opened: Callable[[str], Source]):
     """Bit for bit, so the sums of rewards are equal; `dextron-bench eval` does the same for every row."""
     about, reaches = tensors.read_about(file), file.parent.name
-    if reaches == "real":
-        request.getfixturevalue("release")
     learner = methods.create(about["method"], about["settings"])
     assert isinstance(learner, Learner)
     split = splits.load(reaches, "test")
-    agent, source = weights.agent(learner, file), sources.open_source(reaches)
+    agent, source = weights.agent(learner, file), opened(reaches)
     found = {index: each.score for index, each in rollout.rollout(agent, source, split.cases[:rows])}
     result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
     assert [found[row] for row in range(rows)] == result["splits"]["test"]["scores"][:rows]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -131,18 +131,6 @@ def settings(split: splits.Split) -> pd.DataFrame:
     return pd.DataFrame(found, columns=SETTING)
 
 
-def source(reaches: str, request: pytest.FixtureRequest) -> Source:
-    """The source of a split; `real` reads the authors' release, or skips."""
-    if reaches == "real":
-        request.getfixturevalue("real_data")
-    return open_source(reaches)
-
-
-@pytest.fixture
-def real_data(release: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DEXTRON_DATA", str(release))
-
-
 @each_split
 def test_numbers_lie_where_the_paper_draws_them(shipped: dict, reaches: str, name: str):
     cases = shipped[reaches, name].cases
@@ -192,7 +180,7 @@ def test_no_setting_of_one_split_is_near_one_of_another(shipped: dict, reaches: 
 
 
 @each_source
-def test_held_out_reaches_and_subjects_occur_nowhere_else(shipped: dict, reaches: str, request: pytest.FixtureRequest):
+def test_held_out_reaches_and_subjects_occur_nowhere_else(shipped: dict, reaches: str, opened: Callable[[str], Source]):
     if reaches == "minjerk":
         pytest.skip("every reach of it occurs once")
     home = {name: set(settings(shipped[reaches, name])["reach"]) for name in ("train", "val", "test")}
@@ -200,7 +188,7 @@ def test_held_out_reaches_and_subjects_occur_nowhere_else(shipped: dict, reaches
     for seen in home.values():
         assert not seen & away["unseen-reach"]
     if "unseen-subject" in away:
-        found = source(reaches, request)
+        found = opened(reaches)
         subjects = {found.stratum(reach).subject for reach in away["unseen-subject"]}
         others = set.union(*home.values(), away["unseen-reach"])
         assert len(subjects) <= 2
@@ -220,17 +208,17 @@ def test_minjerk_has_each_reach_once_and_trains_on_the_listed_ones(shipped: dict
 
 
 @each_split
-def test_every_reach_is_known_to_its_source(shipped: dict, reaches: str, name: str, request: pytest.FixtureRequest):
-    found = source(reaches, request)
+def test_every_reach_is_known_to_its_source(shipped: dict, reaches: str, name: str, opened: Callable[[str], Source]):
+    found = opened(reaches)
     for reach in set(settings(shipped[reaches, name])["reach"]):
         found.stratum(reach)  # Raises UnknownReach. Not all reaches of minjerk are listed.
 
 
 @pytest.mark.slow
 @each_split
-def test_experts_replay_at_exactly_20(shipped: dict, reaches: str, name: str, request: pytest.FixtureRequest):
+def test_experts_replay_at_exactly_20(shipped: dict, reaches: str, name: str, opened: Callable[[str], Source]):
     if name == "open":
         pytest.skip("its rows may be unsolvable")
     cases = shipped[reaches, name].cases[:: 8 if name == "train" else 1]  # All of it: see leaderboard/results/exp.
-    played = dict(rollout(ExpertAgent(), source(reaches, request), cases))
+    played = dict(rollout(ExpertAgent(), opened(reaches), cases))
     assert [played[index].score for index in range(len(cases))] == [20.0] * len(cases)
