@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from dextron_bench.exact import Perceptron
+from dextron_bench.exact import Perceptron, rounded
 from torch import Tensor
 from torch.nn.functional import softplus
 
@@ -14,7 +14,6 @@ from baselines.normalise import CLIP
 
 STATE = 48
 LOG_STD = (-20.0, 2.0)
-STEPS = 2**24  # Actions are whole multiples of its inverse: the last bits of tanh differ from machine to machine.
 
 
 def head(outputs: Tensor) -> tuple[Tensor, Tensor]:
@@ -53,4 +52,4 @@ class MeanAgent:
     def act(self, states: np.ndarray) -> np.ndarray:
         """Closing speeds (N, 1) for states (N, 48)."""
         scaled = np.clip((states - self._mean) / self._deviation, -CLIP, CLIP)
-        return np.rint(np.tanh(self._network(scaled)[:, :1]) * STEPS) / STEPS
+        return rounded(np.tanh(self._network(scaled)[:, :1]))

@@ -14,6 +14,7 @@ import numpy as np
 
 MANTISSA = 53  # Bits that float64 holds exactly.
 BLOCK = 64  # Rows at once, so that what lies between the layers stays in the processor's cache.
+STEPS = 2**24  # What `rounded` gives are whole multiples of its inverse.
 SMALLEST = -400  # Exponent of two below which numbers count as 0, so that no unit over- or underflows.
 
 
@@ -49,6 +50,11 @@ class _Whole:
         """The product (N, out) of rows (N, in) and the matrix."""
         numbers, units = whole(x, self._bits, axis=1)
         return (numbers @ self._numbers) * (units * self._units) + 0.0  # Makes -0 a 0.
+
+
+def rounded(x: np.ndarray) -> np.ndarray:
+    """Numbers to about the precision of float32: the last bits of tanh and exp differ from machine to machine."""
+    return np.rint(x * STEPS) / STEPS
 
 
 def whole(x: np.ndarray, bits: int, axis: int) -> tuple[np.ndarray, np.ndarray]:

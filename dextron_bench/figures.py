@@ -117,23 +117,24 @@ def success_curve(points: list[dict[str, float]], file: Path) -> None:
     figure.savefig(file, dpi=150)
 
 
-def ridges(curves: dict[str, Foresight], file: Path) -> None:
+def ridges(episodes: dict[str, Foresight], file: Path) -> None:
     """Draws what the success model thinks of every action, a curve a step, for titled episodes (paper, Fig. 5).
 
     Time, as a share of the reach, goes up; a tick marks the action that was chosen. Green curves foretell the outcome,
     red ones do not. Raises UnknownFormat, OSError.
     """
     _check(file)
-    figure = Figure(figsize=(2.6 * len(curves), 5), layout="constrained")
-    panels = figure.subplots(1, len(curves), sharey=True, squeeze=False)[0]
-    for axes, (title, seen) in zip(panels, curves.items(), strict=True):
-        actions = np.linspace(-1.0, 1.0, seen.curves.shape[1])
-        shown = range(0, len(seen.times), max(1, len(seen.times) // RIDGES))
-        height = 2.5 * seen.times[-1] / len(shown)
+    figure = Figure(figsize=(2.6 * len(episodes), 5), layout="constrained")
+    panels = figure.subplots(1, len(episodes), sharey=True, squeeze=False)[0]
+    for axes, (title, seen) in zip(panels, episodes.items(), strict=True):
+        curves, times = seen.insight.curves, seen.times
+        actions = np.linspace(-1.0, 1.0, curves.shape[1])
+        shown = range(0, len(times), max(1, len(times) // RIDGES))
+        height = 2.5 * times[-1] / len(shown)
         for k in reversed(shown):  # Later steps lie behind.
-            base, colour = seen.times[k], "tab:green" if seen.right[k] else "tab:red"
-            axes.fill_between(actions, base, base + height * seen.curves[k], color=colour, alpha=0.5, linewidth=0)
-            axes.plot(actions, base + height * seen.curves[k], color="0.2", linewidth=0.4)
+            base, colour = times[k], "tab:green" if seen.right[k] else "tab:red"
+            axes.fill_between(actions, base, base + height * curves[k], color=colour, alpha=0.5, linewidth=0)
+            axes.plot(actions, base + height * curves[k], color="0.2", linewidth=0.4)
             axes.plot([seen.episode.actions[k, 0]] * 2, [base, base + 0.5 * height], color="black", linewidth=1)
         axes.set_title(title, fontsize=8, wrap=True)
         axes.set(xlabel="action", xlim=(-1.0, 1.0))

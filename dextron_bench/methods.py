@@ -32,6 +32,9 @@ PAPER: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of its figure 4a, 
 )
 
 
+FLOORS = "nothing", "random"  # Methods that decide nothing: what others are to be seen beside.
+
+
 class Method(Protocol):
     """A way to get an agent. A frozen dataclass whose fields are its settings, each with a default."""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from dextron_bench import diagnosis, gallery, provenance, restoration, splits
+from dextron_bench import gallery, methods, provenance, restoration, splits
 from dextron_bench.replay import replay
 from dextron_bench.success import explanation, network
 from dextron_bench.success.explanation import EXPERT, Foresight
@@ -16,7 +16,6 @@ from dextron_bench.world import sources
 from dextron_bench.world.setting import from_frame
 
 EXPERTS = "exp"  # The method that plays experts.
-FLOORS = "nothing", "random"  # Methods that decide nothing, so that there is nothing to explain.
 
 
 def choose(runs: Path, reaches: str, split: str, rows: int) -> pd.DataFrame:
@@ -65,8 +64,8 @@ def _kinds(known: pd.DataFrame, reaches: str, split: str) -> Iterator[pd.DataFra
 def _foreseen(known: pd.DataFrame, reaches: str, split: str) -> Iterator[Foresight]:
     """All episodes, played again, as the model that ships foretells them."""
     model, source, cases = network.shipped(reaches), sources.open_source(reaches), splits.load(reaches, split).cases
-    kept = known[~known["method"].isin(FLOORS)]
+    kept = known[~known["method"].isin(methods.FLOORS)]
     for place, episode in sorted(replay(source, from_frame(kept), kept["actions"].tolist()), key=lambda each: each[0]):
         row = kept.iloc[place]
         player = EXPERT if row["method"] == EXPERTS else str(row["method"])
-        yield explanation.foresee(model, source, player, episode, diagnosis.diagnose(episode, cases[row["row"]]))
+        yield explanation.foresee(model, source, cases[row["row"]], player, episode)

@@ -39,7 +39,9 @@ def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.C
     assert rows["all"]["rows"] == sum(row["rows"] for kind, row in rows.items() if kind != "all") >= 1500
     assert cli.main(["success", "train", "--epochs", "2", "--quiet"]) == 0
     assert "model.safetensors" in capsys.readouterr().out
-    assert [point["epoch"] for point in fit.curve(here / "runs/success/synthetic/seed0")] == [1, 2]
+    assert [
+        point["epoch"] for point in tensors.read_about(here / "runs/success/synthetic/seed0" / fit.MODEL)["curve"]
+    ] == [1, 2]
     assert cli.main(["success", "eval", "--split", "test", *words[:2], "--json"]) == 0
     experts, policy = json.loads(capsys.readouterr().out)
     assert (experts["split"], experts["player"], policy["player"]) == ("test", "experts", words[1])

@@ -11,6 +11,7 @@ from dextron_bench import figures
 from dextron_bench.diagnosis import Diagnosis
 from dextron_bench.rollout import Episode
 from dextron_bench.success.explanation import KINDS, Foresight, choose
+from dextron_bench.success.insight import Insight
 from dextron_bench.success.network import GRID
 from dextron_bench.world.setting import Setting
 
@@ -22,7 +23,8 @@ def seen(player: str, cause: str, best: list[float], own: list[float]) -> Foresi
     curves[:, -1] = best
     rewards = np.full(steps, 20.0 / steps if cause == "solved" else 0.0)
     episode = Episode(Setting("a", 0, 0, 0), np.zeros((steps + 1, 48)), np.zeros((steps, 1)), rewards, False, True)
-    return Foresight(player, episode, Diagnosis(cause, 0.0), curves, np.array(own), np.arange(steps) / steps)
+    insight = Insight(curves, np.array(own), np.zeros(steps), duration=steps)
+    return Foresight(player, episode, Diagnosis(cause, 0.0), insight)
 
 
 EXPERT = seen("expert", "solved", [0.9, 0.9], [0.8, 0.9])
@@ -57,4 +59,4 @@ def test_the_picture_is_drawn_whatever_the_length(tmp_path: Path):
     assert (tmp_path / "ridges.png").stat().st_size > 10_000
     with pytest.raises(figures.UnknownFormat):
         figures.ridges({"one": EXPERT}, tmp_path / "ridges.txt")
-    assert len(GRID) == EXPERT.curves.shape[1]
+    assert len(GRID) == EXPERT.insight.curves.shape[1]

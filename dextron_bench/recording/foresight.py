@@ -12,6 +12,7 @@ from rerun.encodings import TensorDataBatch
 
 from dextron_bench.recording import scene
 from dextron_bench.success.insight import Insight
+from dextron_bench.success.network import GRID
 
 RIDGES = 40  # Curves of the ridge plot, about.
 WIDTH, HEIGHT, RISE = 1.0, 5.0, 0.4  # Half the ridge plot's width, its height, and that of a curve of chance 1.
@@ -56,9 +57,9 @@ def ridge(insight: Insight, actions: np.ndarray, last: int, success: bool | None
 
 def looks() -> list[Chunk]:
     """What is the same in every episode: colours, the bars' places, and two thin bars of height 1 as their scale."""
-    grid, ends = np.linspace(-1.0, 1.0, 51), [-1.1, 1.1]
+    ends, places = [-1.1, 1.1], len(GRID)
     return [
-        _look("/success/curve", rr.BarChart(grid, abscissa=grid, widths=np.full(51, 0.036), color=BARS)),
+        _look("/success/curve", rr.BarChart(GRID, abscissa=GRID, widths=np.full(places, 0.036), color=BARS)),
         _look("/success/chosen", rr.BarChart([0.0], widths=[0.03], color=TICK), "abscissa"),
         scene.static("/ridge/now", rr.LineStrips2D.from_fields(colors=[NOW], radii=[0.008])),
         scene.static("/success/scale", rr.BarChart([1.0, 1.0], abscissa=ends, widths=[0.02, 0.02], color=FRAME)),

@@ -10,6 +10,7 @@ import numpy as np
 from dextron_bench.diagnosis import Diagnosis, diagnose
 from dextron_bench.experts import ExpertAgent
 from dextron_bench.rollout import Agent, Case, Episode, rollout
+from dextron_bench.success.insight import Insight, look
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.world import model as world
 from dextron_bench.world.setting import Source
@@ -28,22 +29,22 @@ SHUT = 0.2  # It is shut where even the best has this chance at most.
 
 @dataclass(frozen=True, slots=True)
 class Foresight:
-    """An episode as the model foretells it: curves (T, 51), the chosen actions' chances (T,), and times (T,).
-
-    Times are shares of the reach's duration; `player` says who acts, "expert" or a policy's name.
-    """
+    """An episode as the model foretells it; `player` says who acts, "expert" or a policy's name."""
 
     player: str
     episode: Episode
     diagnosis: Diagnosis
-    curves: np.ndarray
-    chances: np.ndarray
-    times: np.ndarray
+    insight: Insight
+
+    @property
+    def times(self) -> np.ndarray:
+        """When each step (T,) is, as a share of the reach's duration."""
+        return np.arange(len(self.insight.chances)) / self.insight.duration
 
     @property
     def right(self) -> np.ndarray:
         """True for the steps (T,) at which the outcome is foretold."""
-        return (self.chances > 0.5) == self.episode.success
+        return (self.insight.chances > 0.5) == self.episode.success
 
     @property
     def foretold(self) -> float:
@@ -51,11 +52,9 @@ class Foresight:
         return float(self.right.mean())
 
 
-def foresee(model: SuccessModel, source: Source, player: str, episode: Episode, diagnosis: Diagnosis) -> Foresight:
-    """What the model thinks at each step of an episode."""
-    before, actions = episode.states[:-1], episode.actions[:, 0]
-    times = np.arange(len(actions)) * world.CONTROL_STEP / source.duration(episode.setting)
-    return Foresight(player, episode, diagnosis, model.curve(before), model.chance(before, actions), times)
+def foresee(model: SuccessModel, source: Source, case: Case, player: str, episode: Episode) -> Foresight:
+    """What the model thinks at each step of an episode of a case."""
+    return Foresight(player, episode, diagnose(episode, case), look(model, source, case, episode))
 
 
 def foreseen(
@@ -65,7 +64,7 @@ def foreseen(
     for player, agent in {EXPERT: ExpertAgent(), **policies}.items():
         played = dict(rollout(agent, source, cases, threads=threads))
         for row, case in enumerate(cases):
-            yield foresee(model, source, player, played[row], diagnose(played[row], case))
+            yield foresee(model, source, case, player, played[row])
 
 
 def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:
@@ -80,14 +79,14 @@ def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:
 
 def _scores(seen: Foresight) -> dict[str, float]:
     """How clear an episode is as each of the kinds that it can be."""
-    own = seen.player != EXPERT
+    own, curves, chances = seen.player != EXPERT, seen.insight.curves, seen.insight.chances
     found = {"wrong": 1.0 - seen.foretold}
     if seen.episode.success:
         found["policy" if own else "expert"] = seen.foretold
     elif own and seen.diagnosis.cause == "too early":
-        found["early"] = _fall(seen.chances)
-    elif own and (seen.curves.max(axis=1) >= OPEN).any() and seen.curves[-1].max() <= SHUT:
-        found["fading"] = seen.foretold * float((seen.curves.max(axis=1) - seen.chances).mean())
+        found["early"] = _fall(chances)
+    elif own and (curves.max(axis=1) >= OPEN).any() and curves[-1].max() <= SHUT:
+        found["fading"] = seen.foretold * float((curves.max(axis=1) - chances).mean())
     return found
 
 

@@ -68,11 +68,6 @@ def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note:
     return SuccessModel(lesson.best)
 
 
-def curve(folder: Path) -> list[dict[str, float]]:
-    """The learning curve of the model in a folder: losses and accuracies on both halves after each epoch."""
-    return tensors.read_about(folder / MODEL)["curve"]
-
-
 def network(rng: np.random.Generator) -> nn.Sequential:
     """New layers, drawn uniformly as PyTorch draws them."""
     (_, wide), (hidden,), _, _, (classes, _), _ = SIZES

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench import experts
+from dextron_bench.experts import Expert
 from dextron_bench.rollout import Case, Episode
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.world import model as world
+from dextron_bench.world import task
 from dextron_bench.world.setting import Source
 
 
@@ -38,7 +40,8 @@ def look(model: SuccessModel, source: Source, case: Case, episode: Episode) -> I
 
 def expert_actions(expert: Expert, states: np.ndarray) -> np.ndarray:
     """What an expert would have done (T,) in states (T, 48) that came one after the other."""
-    agent = ExpertAgent()
-    agent.assign(np.array([0]), [expert])
-    agent.reset(np.array([0]))
-    return np.array([agent.act(state[None])[0, 0] for state in states])
+    distances = task.distance(states)
+    closing = experts.closes(distances, np.full(len(states), distances[0]), np.full(len(states), expert.critical))
+    actions = experts.law(task.closure(states), closing, np.full(len(states), expert.gain))[:, 0]
+    actions[0] = 0.0
+    return actions

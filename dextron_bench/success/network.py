@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 
 from dextron_bench import tensors
-from dextron_bench.exact import Perceptron
+from dextron_bench.exact import Perceptron, rounded
 from dextron_bench.world import model
 
 HIDDEN = 256
 SIZES = ((HIDDEN, model.STATE + 1), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (2, HIDDEN), (2,))  # Of its layers.
 GRID = np.linspace(-1.0, 1.0, 51)  # The actions of a curve (paper, fig. 5).
 CLIP = 10.0  # Scaled states are clipped to this far from 0.
-STEPS = 2**24  # Chances are whole multiples of its inverse: the last bits of exp differ from machine to machine.
 
 
 class BadModel(ValueError):
@@ -65,7 +64,7 @@ class SuccessModel:
     def _chances(self, hidden: np.ndarray) -> np.ndarray:
         against, in_favour = self._rest(np.maximum(hidden, 0.0)).T
         odds = np.exp(np.clip(against - in_favour, -50.0, 50.0))
-        return np.rint(STEPS / (1.0 + odds)) / STEPS
+        return rounded(1.0 / (1.0 + odds))
 
 
 @cache

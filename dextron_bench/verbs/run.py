@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from dextron_bench.run import Plan
 
 EPISODES_FAILED = 3
-FLOORS = ("nothing", "random")
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,9 @@ class Run:
         asked = methods.paper(**chosen(self.settings)) if self.all else [(self.method, chosen(self.settings))]
         plans = [run.Plan(spec, self.reaches, self.split, 0, self.record, settings) for spec, settings in asked]
         reaches = self.reaches if self.all else plans[0].home
-        plans += [run.Plan(name, reaches, self.split, 0) for name in FLOORS if self.floors and name != self.method]
+        plans += [
+            run.Plan(name, reaches, self.split, 0) for name in methods.FLOORS if self.floors and name != self.method
+        ]
         plans = [replace(plan, splits=plan.splits or splits.evaluated(plan.home)) for plan in plans]
         return [[replace(plan, seed=seed) for seed in dict.fromkeys(self.seed)] for plan in plans]
 
