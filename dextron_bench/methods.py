@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
-import importlib
-import importlib.util
 import re
-import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, fields, is_dataclass
 from importlib.metadata import entry_points
-from pathlib import Path
-from types import ModuleType
 from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
+from dextron_bench import entrants
+from dextron_bench.entrants import UnknownMethod as UnknownMethod
 from dextron_bench.learning import Heir, Learner
 from dextron_bench.rollout import Agent, AgentError, blaming
 
 GROUP = "dextron_bench.methods"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")  # A run's folder is called like its method.
-ENTRANT = "dextron_entrant_"  # What the names of modules made of files begin with.
 PAPER: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of its figure 4a, which `run --all` makes.
     ("exp", {}),
     ("sim", {}),
@@ -30,8 +25,6 @@ PAPER: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of its figure 4a, 
     ("rlil", {"dur": 0.1}),
     ("rlil", {"dur": 0.3}),
 )
-
-
 FLOORS = "nothing", "random"  # Methods that decide nothing: what others are to be seen beside.
 
 
@@ -57,13 +50,6 @@ class Situated(Protocol):
 Entrant: TypeAlias = Method | Learner | Heir
 
 
-class UnknownMethod(KeyError):
-    """A method that is not there, or is none."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
-
-
 class BadSettings(ValueError):
     """Settings that a method does not have, or refuses."""
 
@@ -81,10 +67,8 @@ def find(spec: str) -> type[Entrant]:
             raise UnknownMethod(
                 f"no method {spec!r}; choose from {', '.join(known())}, or give module:Class or file.py:Class"
             )
-        return _checked(spec, _loaded(spec, found[0].load))
-    place, _, name = spec.rpartition(":")
-    module = _loaded(spec, lambda: _from_file(spec, place) if place.endswith(".py") else importlib.import_module(place))
-    return _checked(spec, getattr(module, name, None))
+        return _checked(spec, entrants.loaded(spec, found[0].load))
+    return _checked(spec, entrants.find(spec))
 
 
 def create(spec: str, settings: Mapping[str, Any] | None = None, reaches: str = "") -> Entrant:
@@ -129,15 +113,7 @@ def home(method: Entrant, reaches: str) -> str:
 
 def origin(spec: str) -> dict[str, str | None]:
     """Where a method's code is from: its class, and for a file the SHA-256 of its content."""
-    return origin_of(find(spec))
-
-
-def origin_of(found: type) -> dict[str, str | None]:
-    """The same of a class that was found already."""
-    called, digest = found.__module__, None
-    if called.startswith(ENTRANT) and (file := sys.modules[called].__file__):
-        called, digest = Path(file).name, hashlib.sha256(Path(file).read_bytes()).hexdigest()
-    return {"class": f"{called}:{found.__qualname__}", "sha256": digest}
+    return entrants.origin(find(spec))
 
 
 def describe(name: str) -> str:
@@ -175,34 +151,3 @@ def _checked(spec: str, found: Any) -> type[Entrant]:
     if not isinstance(found.name, str) or not NAME.fullmatch(found.name):
         raise UnknownMethod(f"{spec!r} has the name {found.name!r}: use letters, digits and . _ + -, as in 'my-method'")
     return found
-
-
-def _loaded(spec: str, load: Callable[[], Any]) -> Any:
-    """What `load` gives; an entrant's code may raise anything, or end the process."""
-    try:
-        return load()
-    except UnknownMethod:
-        raise
-    except (Exception, SystemExit) as error:
-        raise UnknownMethod(f"method {spec!r} cannot be imported: {type(error).__name__}: {error}") from error
-
-
-def _from_file(spec: str, place: str) -> ModuleType:
-    """The module of a file, executed once in a process."""
-    file = Path(place).resolve()
-    if not file.is_file():
-        raise UnknownMethod(f"method {spec!r}: there is no file {place}")
-    name = f"{ENTRANT}{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    loaded = importlib.util.spec_from_file_location(name, file)
-    assert loaded is not None
-    assert loaded.loader is not None
-    module = importlib.util.module_from_spec(loaded)
-    sys.modules[name] = module
-    try:
-        loaded.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module

@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench import diagnosis, methods, provenance, splits
+from dextron_bench import diagnosis, entrants, methods, provenance, splits
 from dextron_bench.rollout import Case, Episode
 from dextron_bench.success import insight, network
 from dextron_bench.world import model, setting
@@ -37,7 +37,7 @@ def config(method: methods.Entrant, reaches: str, seed: int) -> dict[str, Any]:
     """What a method's run depends on, as `config.json` says it."""
     return {
         "method": method.name,
-        "code": methods.origin_of(type(method)),
+        "code": entrants.origin(type(method)),
         "settings": methods.settings(method),
         "reaches": reaches,
         "seed": seed,

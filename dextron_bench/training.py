@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from dextron_bench import methods, provenance, records
+from dextron_bench import entrants, methods, provenance, records
 from dextron_bench.checkpoints import Checkpoints, Progress
 from dextron_bench.curve import FINALISTS, Curve
 from dextron_bench.learning import Learner, Track, Trainer
@@ -72,7 +72,7 @@ def config(learner: Learner, track: Track, seeds: Sequence[int]) -> dict[str, An
     """What a training depends on; another is not its continuation."""
     return {
         "method": learner.name,
-        "code": methods.origin_of(type(learner)),
+        "code": entrants.origin(type(learner)),
         "settings": methods.settings(learner),
         "seeds": list(seeds),
         "cases": provenance.digest(repr(list(track.cases)).encode()),

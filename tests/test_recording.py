@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 import rerun as rr
 from hypothesis import HealthCheck, given, settings
@@ -18,7 +19,7 @@ from hypothesis import strategies as st
 from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench import recording
-from dextron_bench.recording import archive, layout, scene
+from dextron_bench.recording import archive, layout, scene, storage
 from dextron_bench.rollout import Episode
 from dextron_bench.world import model, reach, task
 from dextron_bench.world.setting import Setting
@@ -119,6 +120,42 @@ def test_a_recording_cut_anywhere_is_noticed(whole: Path, file: Path, share: flo
         recording.read(file)
 
 
+def test_poses_contacts_and_signals_are_read_back_as_they_are(file: Path) -> None:
+    """Shapes in space as Rerun keeps them, in float32; what is plotted in float64."""
+    made = episode(6)
+    recording.write(file, made, PATH, {})
+    kept = [chunk for chunk in RrdReader(file).store().stream().to_chunks() if not chunk.is_static]
+    found = {(chunk.entity_path, name): column for chunk in kept for name, column in columns(chunk).items()}
+    positions, quaternions, touched = scene.poses(made.states)
+    for body in range(1, positions.shape[1]):
+        entity = scene._entity(body)
+        np.testing.assert_array_equal(found[entity, "Transform3D:translation"], positions[:, body].astype(np.float32))
+        turned = quaternions[:, body][:, [1, 2, 3, 0]].astype(np.float32)
+        np.testing.assert_array_equal(found[entity, "Transform3D:quaternion"], turned)
+    points = np.concatenate(touched).astype(np.float32)
+    np.testing.assert_array_equal(found[scene.CONTACTS, "Points3D:positions"].reshape(-1, 3), points)
+    centre = task.palm_centre(made.states)
+    np.testing.assert_array_equal(found["/world/palm_centre", "Points3D:positions"], centre.astype(np.float32))
+    legs = np.stack([centre[:-1], centre[1:]], axis=1).reshape(-1, 3)
+    np.testing.assert_array_equal(found[scene.TRACE, "LineStrips3D:strips"], legs.astype(np.float32))
+    np.testing.assert_array_equal(found["/signals/closure", "Scalars:scalars"][:, 0], task.closure(made.states))
+    lines = [task.distance(made.states), task.bottle_height(made.states), np.full(7, task.LIFTED)]
+    np.testing.assert_array_equal(found["/signals/metres", "Scalars:scalars"].reshape(7, 3), np.stack(lines, axis=1))
+
+
+def columns(chunk: Chunk) -> dict[str, np.ndarray]:
+    """Each component's numbers (N, -1), lists laid end to end."""
+    told = {}
+    for name, column in zip(chunk.to_record_batch().schema.names, chunk.to_record_batch().columns, strict=True):
+        width = 1
+        while hasattr(column, "flatten") and hasattr(column.type, "value_type"):
+            width = getattr(column.type, "list_size", width)
+            column = column.flatten()
+        if pa.types.is_floating(column.type):
+            told[name] = column.to_numpy(zero_copy_only=False).reshape(-1, width)
+    return told
+
+
 def test_what_is_no_recording_is_named(file: Path) -> None:
     with pytest.raises(recording.BrokenRecording, match="there is no such file"):
         recording.read(file)
@@ -128,7 +165,7 @@ def test_what_is_no_recording_is_named(file: Path) -> None:
 
 
 def test_a_recording_of_something_else_is_named(file: Path) -> None:
-    archive._save(file, layout.lines(), "other", layout.blueprint())
+    storage._save(file, layout.lines(), "other", layout.blueprint())
     with pytest.raises(recording.BrokenRecording, match="no digest"):
         recording.read(file)
 
@@ -139,7 +176,7 @@ def test_a_recording_without_a_fact_is_one_of_another_version(whole: Path, file:
     kept = [chunk for chunk in chunks if not str(chunk.entity_path).startswith("/__properties")]
     identity = archive.digest(archive.lines(kept))
     kept.append(Chunk.from_property("digest", rr.AnyValues(sha256=identity)))
-    archive.save(file, kept, identity, layout.blueprint())
+    storage.save(file, kept, identity, layout.blueprint())
     with pytest.raises(recording.BrokenRecording, match="of another version of dextron-bench: it lacks 'reach'"):
         recording.read(file)
 
@@ -151,7 +188,7 @@ def test_a_write_that_fails_leaves_what_was_there(file: Path, monkeypatch: pytes
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(archive, "_seal", full)
+    monkeypatch.setattr(storage, "_seal", full)
     with pytest.raises(recording.UnwritableRecording, match=r"cannot write recording .*episode\.rrd: No space left"):
         recording.write(file, episode(3), PATH, {})
     assert file.read_bytes() == before
@@ -164,7 +201,7 @@ from pathlib import Path
 from typing import Any
 sys.path.insert(0, sys.argv[1])
 import test_recording as here
-here.archive._seal = lambda file: os.kill(os.getpid(), signal.SIGKILL)
+here.storage._seal = lambda file: os.kill(os.getpid(), signal.SIGKILL)
 here.recording.write(Path(sys.argv[2]), here.episode(3), here.PATH, {})
 """
 

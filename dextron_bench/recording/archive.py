@@ -6,9 +6,7 @@ A digest over every value in the file is kept among its properties: Rerun itself
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -17,18 +15,16 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import rerun as rr
-import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
-from rerun_bindings import flush_and_cleanup_orphaned_recordings
 
-from dextron_bench.recording import foresight, layout, scene
+from dextron_bench.recording import foresight, layout, scene, storage
 from dextron_bench.recording.digest import digest, lines
+from dextron_bench.recording.storage import APPLICATION
 from dextron_bench.rollout import Episode
 from dextron_bench.success.insight import Insight
 from dextron_bench.world import model, reach
 from dextron_bench.world.setting import Setting
 
-APPLICATION = "dextron-bench"
 ARRAYS = ("states", "actions", "rewards")
 ENDS = ("terminated", "truncated", "failure")
 
@@ -50,13 +46,6 @@ class BrokenRecording(ValueError):
         super().__init__(f"{file}: {what}")
 
 
-class UnwritableRecording(OSError):
-    """A recording that could not be written; nothing was."""
-
-    def __init__(self, file: Path, why: object) -> None:
-        super().__init__(f"cannot write recording {file}: {why}")
-
-
 def write(
     file: Path, episode: Episode, path: reach.Path, properties: Mapping[str, Value], insight: Insight | None = None
 ) -> str:
@@ -75,25 +64,7 @@ def write(
     props, told = _props()
     identity = digest([*told, *lines(chunks)])
     chunks += [*props, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
-    return save(file, chunks, identity, layout.blueprint(insight is not None))
-
-
-def save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> str:
-    """Writes chunks to `file`, whole or not at all; returns the file's SHA-256. Raises UnwritableRecording."""
-    temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        temporary.touch()
-        _save(temporary, chunks, identity, blueprint)
-        sha256 = _seal(temporary)
-        os.replace(temporary, file)
-    except (OSError, RuntimeError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise UnwritableRecording(file, why) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink()
-    return sha256
+    return storage.save(file, chunks, identity, layout.blueprint(insight is not None))
 
 
 def read(file: Path, sha256: str | None = None) -> Recorded:
@@ -149,27 +120,6 @@ def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk
 def _values(properties: Mapping[str, Value]) -> dict[str, pa.Array]:
     """Arrow values; left to itself, Rerun drops empty strings."""
     return {name: pa.array([value]) for name, value in properties.items()}
-
-
-def _save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> None:
-    """Writes chunks and blueprint; raises RuntimeError where Rerun cannot or, switched off, would not."""
-    recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
-    try:
-        if not rr.is_enabled(recording):
-            raise RuntimeError("Rerun is switched off by RERUN in the environment; unset it")
-        recording.save(file, default_blueprint=blueprint)
-        recording.send_chunks(chunks)
-        recording.disconnect()
-    finally:
-        del recording
-        flush_and_cleanup_orphaned_recordings()
-
-
-def _seal(file: Path) -> str:
-    """Makes the file's bytes last; returns their SHA-256."""
-    with file.open("rb") as opened:
-        os.fsync(opened.fileno())
-        return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
 def _load(file: Path, sha256: str | None) -> list[Chunk]:

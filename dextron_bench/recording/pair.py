@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 
-from dextron_bench.recording import archive, layout, scene
+from dextron_bench.recording import layout, scene, storage
 from dextron_bench.recording.archive import Recorded
 from dextron_bench.recording.properties import read_safely
 
@@ -44,7 +44,7 @@ def pair(file: Path, first: Path, second: Path) -> Path:
         chunks += _moved(each, side)
         chunks += _lines(side)
     names = [f"{side[1:].upper()}: {_name(recorded)}" for side, recorded in zip(SIDES, sides, strict=True)]
-    archive.save(file, chunks, ", ".join(names), _blueprint(names))
+    storage.save(file, chunks, ", ".join(names), _blueprint(names))
     return file
 
 

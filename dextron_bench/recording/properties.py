@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from dextron_bench.recording import glance
-from dextron_bench.recording.archive import APPLICATION, ENDS, BrokenRecording, Recorded, Value, read
+from dextron_bench.recording.archive import ENDS, BrokenRecording, Recorded, Value, read
+from dextron_bench.recording.storage import APPLICATION
 from dextron_bench.world.setting import Setting
 
 NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Told of every episode.

@@ -10,7 +10,7 @@ import rerun as rr
 from rerun_bindings import flush_and_cleanup_orphaned_recordings
 
 from dextron_bench.recording import foresight, layout, scene, viewer
-from dextron_bench.recording.archive import APPLICATION
+from dextron_bench.recording.storage import APPLICATION
 from dextron_bench.success.insight import Insight
 from dextron_bench.world import reach, task
 
