@@ -29,7 +29,9 @@ from dextron_bench.verbs import (
     settings,
     showcase,
     splits,
+    submit,
     success,
+    verification,
     view,
 )
 from dextron_bench.verbs import eval as evaluation
@@ -48,9 +50,13 @@ VERBS: dict[str, type[Verb] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
     "leaderboard": (
-        "The leaderboard: show that of a folder of runs, build the published one.",
-        {"show": leaderboard.Show, "build": leaderboard.Build},
+        "The leaderboard: show that of a folder of runs, build the published one, verify it and what is submitted.",
+        {
+            **{"show": leaderboard.Show, "build": leaderboard.Build},
+            **{"verify": verification.Verify, "add": verification.Add},
+        },
     ),
+    "submit": submit.Submit,
     "view": view.View,
     "recordings": (
         "Recordings: list them, export one as a film or a table, choose a few of the runs'.",

@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench import diagnosis, entrants, methods, provenance, splits
+from dextron_bench import diagnosis, entrants, methods, provenance, splits, traces
 from dextron_bench.rollout import Case, Episode
 from dextron_bench.success import insight, network
 from dextron_bench.world import model, setting
@@ -19,6 +19,7 @@ CONFIG = "config.json"
 PROVENANCE = "provenance.json"
 EPISODES = "episodes.parquet"
 RESULT = "result.json"
+MAKER = ("method", "code", "settings")  # Of a run's config, what a result repeats: by it the agent is made again.
 MANIFEST = "recordings.json"  # The SHA-256 of every recording.
 
 
@@ -82,6 +83,8 @@ def row(split: splits.Split, index: int, episode: Episode) -> dict[str, Any]:
         "cause": found.cause,
         "closing_lag": found.closing_lag,
         "actions": episode.actions[:, 0],
+        "trace": traces.trace(episode),
+        "final": episode.states[-1],
     }
 
 
@@ -144,17 +147,27 @@ def _insight(source: setting.Source, case: Case, episode: Episode) -> insight.In
 
 def conclude(folder: Path, episodes: pd.DataFrame, about: dict[str, Any]) -> None:
     """Writes the result: every episode's score, from which the leaderboard is computed, and how episodes end."""
-    scores = {
-        name: {
-            "digest": rows["digest"].iloc[0],
-            "scores": rows["score"].tolist(),
-            "failed": int((rows["failure"] != "").sum()),
-            "causes": {cause: int(count) for cause, count in rows["cause"].value_counts(sort=False).items()},
-            "closing_lag": None if rows["closing_lag"].isna().all() else round(float(rows["closing_lag"].median()), 3),
-        }
-        for name, rows in episodes.groupby("split", sort=False)
+    made = read_json(folder / CONFIG)
+    found = {"splits": scores(episodes), "provenance": read_json(folder / PROVENANCE)}
+    found["maker"] = {name: made[name] for name in MAKER if name in made}
+    provenance.write_json(folder / RESULT, {**about, **found})
+
+
+def scores(episodes: pd.DataFrame) -> dict[str, Any]:
+    """What a result says of each split, from the rows of its episodes."""
+    return {str(name): _scores(rows) for name, rows in episodes.groupby("split", sort=False)}
+
+
+def _scores(rows: pd.DataFrame) -> dict[str, Any]:
+    told = {
+        "digest": rows["digest"].iloc[0],
+        "scores": rows["score"].tolist(),
+        "failed": int((rows["failure"] != "").sum()),
+        "causes": {cause: int(count) for cause, count in rows["cause"].value_counts(sort=False).items()},
+        "closing_lag": None if rows["closing_lag"].isna().all() else round(float(rows["closing_lag"].median()), 3),
     }
-    provenance.write_json(folder / RESULT, {**about, "splits": scores, "provenance": read_json(folder / PROVENANCE)})
+    kept = rows["actions"] if "actions" in rows else pd.Series([None])
+    return told if kept.isna().any() else told | {"actions": traces.of_actions(kept)}
 
 
 def results(folder: Path) -> Iterator[dict[str, Any]]:

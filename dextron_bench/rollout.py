@@ -77,11 +77,17 @@ class AgentError(ValueError):
     """An agent that raises, or whose actions are not of the agreed shape."""
 
 
+class AgentDown(RuntimeError):
+    """Raised in `act` by an agent that can start again: it fails the episodes that are being played, and no others."""
+
+
 @contextmanager
 def blaming(what: str) -> Iterator[None]:
     """Makes what an entrant's own code raises an AgentError that says where: `what`, a phrase like "act()"."""
     try:
         yield
+    except (AgentDown, AgentError):
+        raise
     except Exception as error:
         raise AgentError(f"{what} raised {type(error).__name__}: {error}; --debug shows where") from error
 
@@ -92,7 +98,7 @@ def rollout(
     """Plays every case once; yields (index of the case, episode) as episodes end.
 
     Raises AgentError where the agent raises or actions have a wrong shape. An action that is not finite or lies outside
-    [-1, 1] fails its own episode and no other.
+    [-1, 1] fails its own episode and no other; AgentDown fails those that are being played.
     """
     return _Evaluation(agent, source, cases, Engine(min(slots, max(len(cases), 1)), threads)).run()
 
@@ -115,7 +121,12 @@ class _Evaluation:
         """Yields every case's episode."""
         self._refill(np.arange(self._engine.slots))
         while (live := np.flatnonzero(self._case >= 0)).size:
-            actions = self._ask()
+            try:
+                actions = self._ask()
+            except AgentDown as error:
+                yield from [self._episode(slot, failure=str(error)) for slot in live.tolist()]
+                self._refill(live)
+                continue
             allowed = np.abs(actions[live, 0]) <= 1.0  # False for NaN.
             sound, faulty = live[allowed], live[~allowed]
             step = self._engine.step(sound, actions[sound])

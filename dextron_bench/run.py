@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,12 @@ import pandas as pd
 from dextron_bench import lessons, methods, records, splits, training, weights
 from dextron_bench.learning import Heir, Learner
 from dextron_bench.methods import Entrant
-from dextron_bench.rollout import Agent, blaming, rollout
+from dextron_bench.rollout import Agent, Episode, blaming, rollout
 from dextron_bench.world import sources
+from dextron_bench.world.setting import Source
 
 Report = Callable[[int, int], None]  # Told (done, all).
+Played = Iterator[tuple[int, Episode]]  # Rows and their episodes, as these end.
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,26 +96,47 @@ def execute(plan: Plan, runs: Path, threads: int = 0, report: Report = quiet) ->
     learn([plan], runs, threads)
     given = _given(method, plan, runs)
     if given:
-        _agent(method, plan.seed, given)  # Raises before there is a folder.
+        agent(method, plan.seed, given)  # Raises before there is a folder.
     records.claim(folder, plan.config())
     trained = weights.adopt(given, folder) if given else None
     about = {"method": plan.label, "reaches": plan.home, "seed": plan.seed}
+
+    def play(split: splits.Split) -> Played:
+        return rollout(agent(method, plan.seed, trained), source, split.cases, threads=threads)
+
+    episodes = evaluate(folder, source, wanted, play, plan.record, about, report)
+    records.conclude(folder, episodes, about | ({"training": weights.about(trained)} if trained else {}))
+    return folder
+
+
+def evaluate(
+    folder: Path,
+    source: Source,
+    wanted: Sequence[splits.Split],
+    play: Callable[[splits.Split], Played],
+    record: int,
+    about: dict[str, Any],
+    report: Report = quiet,
+) -> pd.DataFrame:
+    """The table of episodes of a run's folder, those that it lacks played and added split by split.
+
+    `play` gives (row, episode) of a split's rows as they end; the first `record` are recorded, told of by `about`.
+    """
     episodes = records.stored(folder, wanted)
     for split in wanted:
         done = episodes[episodes["split"] == split.name] if len(episodes) else episodes
-        if len(done) == len(split.cases) and not records.unrecorded(folder, done, plan.record):
+        if len(done) == len(split.cases) and not records.unrecorded(folder, done, record):
             continue
         rows: dict[int, dict[str, Any]] = {}
-        for index, episode in rollout(_agent(method, plan.seed, trained), source, split.cases, threads=threads):
+        for index, episode in play(split):
             rows[index] = records.row(split, index, episode)
-            if index < plan.record and len(episode.actions):
+            if index < record and len(episode.actions):
                 records.record(folder, source, split, index, episode, about)
             report(len(rows), len(split.cases))
         kept = [episodes[episodes["split"] != split.name]] if len(episodes) else []
         episodes = pd.concat([*kept, pd.DataFrame([rows[index] for index in sorted(rows)])], ignore_index=True)
         records.store(folder, episodes)
-    records.conclude(folder, episodes, about | ({"training": weights.about(trained)} if trained else {}))
-    return folder
+    return episodes
 
 
 def _given(method: Entrant, plan: Plan, runs: Path) -> Path | None:
@@ -125,7 +148,8 @@ def _given(method: Entrant, plan: Plan, runs: Path) -> Path | None:
     return plan.weights
 
 
-def _agent(method: Entrant, seed: int, trained: Path | None) -> Agent:
+def agent(method: Entrant, seed: int, trained: Path | None) -> Agent:
+    """A method's agent for a seed, with the weights of a file where it learns; raises AgentError, BadWeights."""
     if isinstance(method, Heir | Learner):
         assert trained is not None
         return weights.agent(method.teacher if isinstance(method, Heir) else method, trained)

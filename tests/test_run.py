@@ -164,7 +164,7 @@ def test_a_missing_recording_is_made_and_one_that_cannot_be_is_not_missed(
     assert made == []  # An episode that failed before its first step.
     assert records.read_result(folder / "result.json")["splits"]["open"] == {
         "digest": splits.load("synthetic", "open").digest, "scores": [0.0], "failed": 1,
-        "causes": {"agent failed": 1}, "closing_lag": None,
+        "causes": {"agent failed": 1}, "closing_lag": None, "actions": ["af5570f5a181"],
     }  # fmt: skip
     monkeypatch.setattr(run, "rollout", forbid)
     play(tmp_path, plan)

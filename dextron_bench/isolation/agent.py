@@ -1,0 +1,233 @@
+"""An agent in a process of its own, with limits on time and memory, started again where it fails."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import shlex
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from dextron_bench.isolation import wire
+from dextron_bench.rollout import AgentDown, AgentError
+
+KEPT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT", "VIRTUAL_ENV")  # Of the environment.
+TAIL = 2000  # [bytes] of what an agent writes to its stderr that are looked at.
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Seconds to start, seconds for one answer, and bytes of memory."""
+
+    start: float = 60.0
+    answer: float = 10.0
+    memory: int = 4 * 2**30
+
+
+@dataclass(frozen=True, slots=True)
+class Launch:
+    """What starts an agent's process: words of a command, or, for Python's, what `worker` is told."""
+
+    command: tuple[str, ...] = ()
+    kind: str = ""
+    spec: str = ""
+    settings: dict[str, Any] = field(default_factory=dict)
+    weights: str = ""
+    own: tuple[str, ...] = ()
+
+    def words(self, scratch: str, memory: int) -> list[str]:
+        """The command, for a folder that the process may write to."""
+        if self.command:
+            return list(self.command)
+        told = {**asdict(self), "scratch": scratch, "memory": memory}
+        return [sys.executable, "-P", "-m", "dextron_bench.isolation.worker", json.dumps(told)]
+
+
+def launch(spec: str, settings: dict[str, Any] | None = None, weights: Path | None = None) -> Launch:
+    """How to start the agent that a user names.
+
+    `exec:COMMAND` is a program that speaks the protocol, `FILE.pt` and `FILE.onnx` are policies, `file.py:Class` and
+    `module:Class` are code, all else is an installed method. `weights` are those of a method that learns.
+    """
+    file = str(weights.resolve()) if weights else ""
+    more = {"settings": settings or {}, "weights": file, "own": (file,) if file else ()}
+    place, _, name = spec.rpartition(":")
+    if spec.startswith("exec:"):
+        words = shlex.split(spec.removeprefix("exec:"))
+        return Launch(command=tuple(str(Path(word).resolve()) if Path(word).exists() else word for word in words))
+    if Path(spec).suffix in (".pt", ".onnx"):
+        whole = str(Path(spec).resolve())
+        return Launch(kind="policy", spec=whole, own=(whole,))
+    if place.endswith(".py"):
+        more["own"] += (str(Path(place).resolve().parent),)
+        return Launch(kind="code", spec=f"{Path(place).resolve()}:{name}", **more)
+    return Launch(kind="code" if place else "method", spec=spec, **more)
+
+
+class Isolated:
+    """Plays the agent of a process; use it as a context, or `close` it.
+
+    Raises AgentError where the process does not start the first time; what goes wrong later raises AgentDown, which
+    fails the episodes that were being played, and the next question starts the process again.
+    """
+
+    def __init__(self, how: Launch, seed: int = 0, limits: Limits | None = None) -> None:
+        self._how, self._seed, self._limits = how, seed, limits or Limits()
+        self._process: _Process | None = None
+        self._begun: list[int] = []
+        self._scratch = tempfile.TemporaryDirectory(prefix="dextron-agent-", ignore_cleanup_errors=True)
+        self.starts = 0
+        self.peak = 0  # [bytes] of memory at most, as last seen; 0 where the system does not tell.
+
+    def __enter__(self) -> Isolated:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the process."""
+        self._stop()
+        self._scratch.cleanup()
+
+    def reset(self, episodes: np.ndarray) -> None:
+        """Tells, with the next question, that rows `episodes` begin a new episode."""
+        self._begun += episodes.tolist()
+
+    def act(self, states: np.ndarray) -> np.ndarray:
+        """Actions (N, 1) for states (N, 48); raises AgentDown, AgentError."""
+        begun, self._begun = sorted(set(self._begun)), []
+        process = self._process or self._start(len(states))
+        try:
+            line = process.ask(wire.question(begun, states), self._limits.answer, wire.longest(len(states)))
+            return wire.actions(line, len(states))
+        except (wire.BadAnswer, _Silent) as error:
+            why = process.epitaph(error)
+            self._stop()
+            raise AgentDown(why) from error
+
+    def _start(self, episodes: int) -> _Process:
+        self.starts += 1
+        try:
+            process = self._process = _Process(
+                self._how.words(self._scratch.name, self._limits.memory), self._scratch.name
+            )
+        except (OSError, IndexError) as error:
+            raise AgentError(f"the agent's process cannot be started: {error}") from error
+        try:
+            wire.greeted(process.ask(wire.greeting(self._seed, episodes), self._limits.start, wire.HEAD))
+        except (wire.BadAnswer, _Silent) as error:
+            why = process.epitaph(error)
+            self._stop()
+            raise (AgentDown if self.starts > 1 else AgentError)(f"the agent did not start: {why}") from error
+        return process
+
+    def _stop(self) -> None:
+        if self._process:
+            self.peak = max(self.peak, self._process.peak())
+            self._process.kill()
+            self._process = None
+
+
+class _Silent(RuntimeError):
+    """A process from which no answer came."""
+
+
+class _Process:
+    """A process that is asked by lines; threads read and write, so that neither side can hang us."""
+
+    def __init__(self, words: Sequence[str], folder: str) -> None:
+        environment = {name: os.environ[name] for name in KEPT if name in os.environ}
+        environment |= {"HOME": folder, "TMPDIR": folder, "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `kill`)
+        self._popen = subprocess.Popen(
+            words,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._said,
+            cwd=folder,
+            env=environment,
+            start_new_session=True,
+        )
+        self._questions: queue.Queue[bytes | None] = queue.Queue()
+        self._answers: queue.Queue[bytes] = queue.Queue()
+        self._room = wire.HEAD
+        assert self._popen.stdin
+        assert self._popen.stdout
+        threading.Thread(target=self._write, args=(self._popen.stdin,), daemon=True).start()
+        threading.Thread(target=self._read, args=(self._popen.stdout,), daemon=True).start()
+
+    def ask(self, question: bytes, seconds: float, room: int) -> bytes:
+        """The line that answers; raises _Silent."""
+        if not self._answers.empty() and (extra := self._answers.get()):
+            raise _Silent(f"it wrote {len(extra)} bytes that nobody asked for")
+        self._room = room
+        self._questions.put(question)
+        try:
+            line = self._answers.get(timeout=seconds)
+        except queue.Empty:
+            raise _Silent(f"it gave no answer within {seconds:g} s") from None
+        if not line.endswith(b"\n"):
+            raise _Silent(f"its answer is longer than {room} bytes" if len(line) > room else "it ended")
+        return line
+
+    def epitaph(self, error: Exception) -> str:
+        """What went wrong, with how the process ended and the last line that it wrote to stderr."""
+        if str(error) == "it ended":
+            try:
+                code = self._popen.wait(1.0)
+            except subprocess.TimeoutExpired:
+                code = None
+            how = f"with signal {signal.Signals(-code).name}" if code is not None and code < 0 else f"with code {code}"
+            error = _Silent(f"it ended {how}")
+        self._said.seek(max(0, self._said.seek(0, os.SEEK_END) - TAIL))
+        lines = self._said.read().decode(errors="replace").split("\n")
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        return f"{error}: {last}" if last else str(error)
+
+    def peak(self) -> int:
+        """The most memory [bytes] that the process has held, 0 where the system does not tell."""
+        try:
+            for line in Path(f"/proc/{self._popen.pid}/status").read_text().splitlines():
+                if line.startswith("VmHWM"):
+                    return int(line.split()[1]) * 1024
+        except (OSError, ValueError):
+            pass
+        return 0
+
+    def kill(self) -> None:
+        """Ends the process and what it started."""
+        self._questions.put(None)
+        try:
+            os.killpg(self._popen.pid, signal.SIGKILL)
+        except (OSError, AttributeError):
+            self._popen.kill()
+        self._popen.wait()
+        self._said.close()
+
+    def _write(self, pipe: IO[bytes]) -> None:
+        try:
+            while (question := self._questions.get()) is not None:
+                pipe.write(question)
+                pipe.flush()
+            pipe.close()
+        except OSError:
+            pass  # It ended; the reader tells.
+
+    def _read(self, pipe: IO[bytes]) -> None:
+        with pipe:
+            while line := pipe.readline(self._room + 1):
+                self._answers.put(line)
+                if not line.endswith(b"\n"):
+                    return
+        self._answers.put(b"")

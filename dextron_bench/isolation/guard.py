@@ -1,0 +1,109 @@
+"""What an agent's process may not do: see the simulator or the splits, write outside its folder, reach others.
+
+A hook on Python's own audit events stops an agent that tries in Python, by accident or design, and says what it was. It
+stops no native code that means harm: docs/agents.md says what remains, and what covers it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from dextron_bench.world import model
+
+PUBLIC = {  # Modules of the benchmark that agents may import, with what those need.
+    *("dextron_bench", "dextron_bench.exact", "dextron_bench.experts", "dextron_bench.tensors"),
+    *("dextron_bench.provenance", "dextron_bench.success", "dextron_bench.success.network", "dextron_bench.world"),
+    *(f"dextron_bench.world.{name}" for name in ("model", "task", "rotation", "reach")),
+}
+SIMULATORS = ("mujoco", "dm_control")
+SECRET = ("splits", "experts", "database")  # What names in the package's data begin with that tell of settings.
+REACHING = ("socket.connect", "socket.bind", "socket.sendto", "socket.getaddrinfo", "socket.gethostbyname")
+STARTING = ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "os.forkpty")
+DIGGING = ("gc.get_objects", "gc.get_referrers", "gc.get_referents", "sys._current_frames")
+CHANGING = (
+    *("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate"),
+    *("os.chmod", "os.chown", "os.utime", "os.setxattr", "sqlite3.connect"),
+)
+WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+DEVICES = ("/dev/null", "/dev/urandom", "/dev/random", "/proc/cpuinfo", "/proc/meminfo", "/proc/self", "/sys/devices")
+
+
+class NotForAgents(PermissionError):
+    """What an agent tried and may not."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(f"agents may not {what}")
+
+
+def close(own: Sequence[Path], scratch: Path) -> None:
+    """From now on this process reads only Python's own files and those in `own`, and writes only below `scratch`."""
+    hide()
+    package = Path(__file__).resolve().parents[1]
+    places = {sys.prefix, sys.base_prefix, sys.exec_prefix, *(entry for entry in sys.path if "-packages" in entry)}
+    allowed = [*places, *DEVICES, "/usr", "/lib", "/lib64", "/etc", package, package.parent / "baselines", *own]
+    guard = _Guard([os.path.realpath(place) for place in allowed], os.path.realpath(scratch), str(package / "data"))
+    sys.addaudithook(guard)
+
+
+def hide() -> None:
+    """Takes the simulator out of this process's sight; what pure functions on states need of it is kept."""
+    for prepared in (model.proximal, model.command_gain, model.half_closed, model.state_names):
+        prepared()
+    model.load = model.mujoco = None  # type: ignore[assignment]
+    for name in list(sys.modules):
+        if _is_hidden(name):
+            parent, _, last = name.rpartition(".")
+            if parent and hasattr(sys.modules.get(parent), last):
+                delattr(sys.modules[parent], last)
+            del sys.modules[name]
+
+
+def _is_hidden(name: str) -> bool:
+    top = name.partition(".")[0]
+    own = name.startswith("dextron_bench.isolation") or name == "dextron_bench.entrants"
+    return top in SIMULATORS or (top == "dextron_bench" and name not in PUBLIC and not own)
+
+
+class _Guard:
+    """The hook; raises NotForAgents."""
+
+    def __init__(self, allowed: Sequence[str], scratch: str, data: str) -> None:
+        self._allowed, self._scratch, self._data = tuple(allowed), scratch, data
+
+    def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "import" and _is_hidden(arguments[0]):
+            raise NotForAgents(f"import {arguments[0]}, by which the simulator and the splits are reached")
+        if event == "open":
+            self._check_open(*arguments)
+        elif event in CHANGING:
+            self._check_change(arguments[0], event)
+        elif event in REACHING:
+            raise NotForAgents(f"use the network ({event})")
+        elif event in STARTING or event.startswith(("os.spawn", "os.exec", "os.kill", "pty.")):
+            raise NotForAgents(f"start or signal processes ({event})")
+        elif event in DIGGING:
+            raise NotForAgents(f"search the process they run in ({event})")
+
+    def _check_open(self, path: Any, mode: str | None, flags: int) -> None:
+        if not isinstance(path, str | bytes | os.PathLike):
+            return  # A file descriptor.
+        place = os.path.realpath(os.fsdecode(path))
+        if flags & WRITING and place != "/dev/null" and not _within(place, self._scratch):
+            raise NotForAgents(f"write {place}: only the folder they are started in is theirs")
+        if _within(place, self._data) and os.path.basename(place).startswith(SECRET):
+            raise NotForAgents(f"read {place}: settings and experts are not for agents")
+        if not any(_within(place, each) for each in (*self._allowed, self._scratch)):
+            raise NotForAgents(f"read {place}: only Python's files and their own folder are theirs")
+
+    def _check_change(self, path: Any, event: str) -> None:
+        place = os.path.realpath(os.fsdecode(path)) if isinstance(path, str | bytes | os.PathLike) else ""
+        if not _within(place, self._scratch):
+            raise NotForAgents(f"change files outside the folder they are started in ({event} {place})")
+
+
+def _within(place: str, folder: str) -> bool:
+    return place == folder or place.startswith(folder.rstrip("/") + "/")

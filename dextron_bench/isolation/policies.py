@@ -1,0 +1,68 @@
+"""Policies in files that run no code of their own: TorchScript and ONNX."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+KINDS = (".pt", ".onnx")
+
+
+class BadPolicy(ValueError):
+    """A file that holds no policy of these kinds."""
+
+
+class FilePolicy:
+    """Maps states to actions by a function without memory, float32 in and out."""
+
+    def __init__(self, function: Callable[[np.ndarray], np.ndarray]) -> None:
+        self._function = function
+
+    def reset(self, episodes: np.ndarray) -> None:
+        """Has no memory."""
+
+    def act(self, states: np.ndarray) -> np.ndarray:
+        """Actions (N, 1) for states (N, 48)."""
+        return np.asarray(self._function(states.astype(np.float32)), np.float64)
+
+
+def load(file: Path) -> FilePolicy:
+    """The policy of a TorchScript (.pt) or ONNX (.onnx) file: (N, 48) to (N, 1); raises BadPolicy."""
+    makes = {".pt": _torchscript, ".onnx": _onnx}
+    if file.suffix not in makes:
+        raise BadPolicy(f"{file} is no policy: known kinds end in {', '.join(KINDS)}")
+    return FilePolicy(makes[file.suffix](file))
+
+
+def _torchscript(file: Path) -> Callable[[np.ndarray], np.ndarray]:
+    import torch
+
+    torch.set_num_threads(1)
+    try:
+        module = torch.jit.load(str(file), map_location="cpu").eval()
+    except (RuntimeError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise BadPolicy(f"{file} is no TorchScript file ({reason}); torch.jit.save makes one") from error
+
+    def act(states: np.ndarray) -> np.ndarray:
+        with torch.inference_mode():
+            return module(torch.from_numpy(states)).numpy()
+
+    return act
+
+
+def _onnx(file: Path) -> Callable[[np.ndarray], np.ndarray]:
+    try:
+        import onnxruntime  # pyright: ignore[reportMissingImports]
+    except ModuleNotFoundError as error:
+        raise BadPolicy(f"{file} needs ONNX Runtime: pip install 'dextron-bench[onnx]'") from error
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    try:
+        session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # ONNX Runtime raises kinds of its own.
+        raise BadPolicy(f"{file} is no ONNX file that can be run ({str(error).splitlines()[0]})") from error
+    name = session.get_inputs()[0].name
+    return lambda states: np.asarray(session.run(None, {name: states})[0])

@@ -1,0 +1,100 @@
+"""`dextron-bench submit`: try an agent on all that a submission needs, and write its bundle."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from dextron_bench.verbs.leaderboard import print_rows
+from dextron_bench.verbs.printing import progress_bar
+from dextron_bench.verbs.run import EPISODES_FAILED
+
+
+@dataclass(frozen=True)
+class Submit:
+    """Play every episode that ranks methods with an agent in a process of its own, and write one bundle (a zip).
+
+    AGENT is a method's name, module:Class, file.py:Class, FILE.pt (TorchScript), FILE.onnx, or 'exec:COMMAND' for a
+    program that speaks the protocol. What was played already is not played again.
+
+    Example: dextron-bench submit my_agent/agent.py:MyAgent --name my-agent
+    """
+
+    agent: tyro.conf.Positional[str]
+    """Which agent: see above."""
+    name: str
+    """What its row on the leaderboard is called."""
+    reaches: Literal["real", "synthetic"] = "synthetic"
+    """The source of reaches."""
+    seed: tuple[int, ...] = (0, 1, 2)
+    """Seeds of the agent; one is enough where nothing in it is drawn at random."""
+    weights: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
+    """Weights of a method that learns."""
+    into: Path | None = None
+    """The bundle; by default NAME-REACHES.zip here."""
+    record: int = 1
+    """Add recordings (.rrd) of the first so many rows of each split; every episode can be replayed in any case."""
+    frames: int | None = None
+    """Declared: control steps that it was trained for."""
+    demonstrations: int | None = None
+    """Declared: expert episodes that it learned from."""
+    hours: float | None = None
+    """Declared: hours of training."""
+    hardware: str = ""
+    """Declared: what it was trained on."""
+    privileged: bool = False
+    """Declared: it is told more than the 48 numbers of the state."""
+    authors: str = ""
+    """Declared: whose it is."""
+    url: str = ""
+    """Declared: where to read about it."""
+    notes: str = ""
+    """Declared: anything else."""
+    timeout: float = 10.0
+    """Seconds that one answer may take."""
+    memory: float = 4.0
+    """GiB of memory that the agent may take."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    threads: int = 0
+    """Threads of the simulation; 0 takes one for each processor. Results do not depend on it."""
+    quiet: bool = False
+    """Show no progress."""
+    settings: str = "{}"
+    """Settings of a method or class, as JSON, like '{"near": 0.05}'."""
+
+    def __call__(self) -> int:
+        from dextron_bench import leaderboard, records
+        from dextron_bench.isolation import Limits
+        from dextron_bench.submission import contest
+
+        entry = self._entry()
+        file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
+        limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
+        with progress_bar(entry.name, self.quiet) as progress:
+            folder = contest.compete(entry, self.runs, self.record, limits, self.threads, progress)
+        contest.finish(entry, folder, file)
+        rows = leaderboard.table(records.read_result(folder / f"seed{seed}" / records.RESULT) for seed in entry.seeds)
+        print_rows(rows, as_json=False)
+        failures = contest.failures(folder, entry.seeds)
+        for why, count in failures.items():
+            print(f"{count} episodes failed: {why}")
+        print(f"{file}: check it with `dextron-bench leaderboard verify {file}`, then send it in (docs/leaderboard.md)")
+        return EPISODES_FAILED if failures else 0
+
+    def _entry(self) -> Any:
+        from dextron_bench.submission import contest
+
+        declared = contest.Declaration(**{each.name: getattr(self, each.name) for each in fields(contest.Declaration)})
+        seeds = tuple(dict.fromkeys(self.seed))
+        try:
+            settings = json.loads(self.settings)
+        except ValueError as error:
+            raise contest.BadSubmission(f"--settings is no JSON ({error})") from error
+        return contest.Entry(
+            self.name, self.agent, self.reaches, seeds, settings, self.weights, declared
+        )  # fmt: skip
