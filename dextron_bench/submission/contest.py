@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench import methods, provenance, records, run, splits
-from dextron_bench.isolation import Isolated, Limits, launch
-from dextron_bench.isolation.agent import Launch
+from dextron_bench.isolation.agent import Isolated, Launch, Limits, launch
 from dextron_bench.rollout import rollout
 from dextron_bench.submission import bundle
 from dextron_bench.world import model, sources

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dextron_bench import recording, records, splits
-from dextron_bench.isolation import Limits, launch
-from dextron_bench.isolation.agent import Launch
+from dextron_bench.isolation.agent import Launch, Limits, launch
 from dextron_bench.rollout import AgentError, Episode
 from dextron_bench.submission import bundle, contest, copies, replaying, tables
 from dextron_bench.submission.differences import differences, same_platform
@@ -56,9 +55,7 @@ def verify(
         verdict.problems.append("was played with other physics than this version's; submit it again with this version")
         return verdict
     if sorted(manifest["seeds"]) != list(range(len(manifest["seeds"]))):
-        verdict.problems.append(
-            f"has seeds {manifest['seeds']}; they must be 0, 1, 2 and so on, so that none is chosen"
-        )
+        verdict.problems.append(f"has seeds {manifest['seeds']}; they must be 0, 1, 2 and so on, none chosen")
     wanted = [splits.load(manifest["reaches"], name) for name in splits.evaluated(manifest["reaches"])]
     for seed in manifest["seeds"]:
         checked = _Seed(folder, manifest, seed, wanted, verdict)
@@ -150,8 +147,8 @@ class _Seed:
             self._object(*found.differing)
         else:
             verdict.notes.append(
-                f"seed{self._seed}: made on another platform; {found.alike} of {found.episodes} episodes end alike, with "
-                f"a last state within {replaying.TOLERANCE:g}; {found.exact} are equal bit for bit"
+                f"seed{self._seed}: made on another platform; of {found.episodes} episodes {found.exact} are equal bit "
+                f"for bit, {found.alike} end alike with a last state within {replaying.TOLERANCE:g}"
             )
         verdict.results[self._seed] = {
             **whose, "splits": computed, "provenance": told, "declared": self._manifest["declared"]

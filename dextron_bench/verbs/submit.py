@@ -69,7 +69,7 @@ class Submit:
 
     def __call__(self) -> int:
         from dextron_bench import leaderboard, records
-        from dextron_bench.isolation import Limits
+        from dextron_bench.isolation.agent import Limits
         from dextron_bench.submission import contest
 
         entry = self._entry()
@@ -95,6 +95,4 @@ class Submit:
             settings = json.loads(self.settings)
         except ValueError as error:
             raise contest.BadSubmission(f"--settings is no JSON ({error})") from error
-        return contest.Entry(
-            self.name, self.agent, self.reaches, seeds, settings, self.weights, declared
-        )  # fmt: skip
+        return contest.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, declared)

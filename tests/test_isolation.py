@@ -1,0 +1,194 @@
+"""Agents in processes of their own: they act as they do here, and what they may not do or cannot is survived."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from brief import SOURCE
+from hypothesis import given
+from hypothesis import strategies as st
+from tiny import ROWS
+
+from dextron_bench import splits
+from dextron_bench.isolation import policies, wire
+from dextron_bench.isolation.agent import Isolated, Limits, launch
+from dextron_bench.rollout import AgentError, Case, Episode, rollout
+
+CASES: list[Case] = splits.cases(ROWS[:3])
+AGENT = """
+import numpy as np
+from dextron_bench.world import task
+
+class Agent:
+    name = "mine"
+
+    def agent(self, seed):
+        return self
+
+    def reset(self, episodes):
+        pass
+
+    def act(self, states):
+        {act}
+"""
+CLOSES = "return np.where(task.distance(states) < 0.06, 1.0, -1.0)[:, None]"
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Callable[[str], str]:
+    """Writes an agent whose `act` is some line; returns what names it."""
+
+    def made(act: str) -> str:
+        file = tmp_path / "mine.py"
+        file.write_text(AGENT.format(act=act))
+        return f"{file}:Agent"
+
+    return made
+
+
+def play(spec: str, cases: list[Case] = CASES, **limits: float) -> list[Episode]:
+    with Isolated(launch(spec), limits=Limits(**limits)) as agent:  # pyright: ignore[reportArgumentType]
+        found = dict(rollout(agent, SOURCE, cases, slots=2, threads=1))
+    return [found[index] for index in range(len(cases))]
+
+
+def test_an_isolated_agent_acts_as_it_does_here(made: Callable[[str], str]):
+    class Here:
+        def reset(self, episodes: np.ndarray) -> None: ...
+
+        def act(self, states: np.ndarray) -> np.ndarray:
+            from dextron_bench.world import task
+
+            return np.where(task.distance(states) < 0.06, 1.0, -1.0)[:, None]
+
+    here = dict(rollout(Here(), SOURCE, CASES, slots=2, threads=1))
+    for index, episode in enumerate(play(made(CLOSES))):
+        np.testing.assert_array_equal(episode.states, here[index].states)
+        np.testing.assert_array_equal(episode.actions, here[index].actions)
+        assert episode.score == here[index].score
+
+
+def test_installed_methods_and_what_agents_print(made: Callable[[str], str]):
+    assert [episode.failure for episode in play("nothing")] == [""] * 3
+    assert [episode.failure for episode in play(made(f"print('hello'); {CLOSES}"))] == [""] * 3
+
+
+@pytest.mark.parametrize(
+    ("act", "why"),
+    [
+        ("from dextron_bench.world.engine import Engine", "agents may not import dextron_bench.world.engine"),
+        ("from dextron_bench import splits", "agents may not import dextron_bench.splits"),
+        ("import mujoco", "agents may not import mujoco"),
+        ("from dextron_bench.world import model; model.load()", "'NoneType' object is not callable"),
+        ("import dextron_bench as d; open(d.__path__[0] + '/data/splits.json')", "settings and experts are not for"),
+        ("open('/etc/../root/.bashrc')", "only Python's files and their own folder are theirs"),
+        ("open(__file__, 'a')", "only the folder they are started in is theirs"),
+        ("import os; os.remove(__file__)", "agents may not change files outside the folder"),
+        ("import socket; socket.create_connection(('127.0.0.1', 9))", "agents may not use the network"),
+        ("import subprocess; subprocess.run(['ls'])", "agents may not start or signal processes"),
+        ("import os; os.kill(os.getppid(), 9)", "agents may not start or signal processes"),
+        ("import gc; gc.get_objects()", "agents may not search the process"),
+        ("return np.ones((1, 1, 1))", "act() must return floats of shape (2, 1)"),
+        ("return np.ones((len(states), 1), int)", "it returned int64"),
+        ("import os; os._exit(7)", "it ended with code 7"),
+        ("import os, signal; signal.raise_signal(9)", "it ended with signal SIGKILL"),
+        ("return np.ones((2, 10**10))", "Unable to allocate"),
+        ("raise ValueError('lost')", "ValueError: lost"),
+        ("while True: pass", "it gave no answer within 1 s"),
+    ],
+)
+def test_what_fails_or_is_forbidden_fails_its_episodes_and_is_told(act: str, why: str, made: Callable[[str], str]):
+    for episode in play(made(act), CASES[:2], answer=1.0 if "while" in act else 20.0):
+        assert episode.score == 0.0
+        assert why in episode.failure
+        assert episode.failure.endswith(" at step 0")
+
+
+def test_an_agent_may_write_where_it_is_started(made: Callable[[str], str]):
+    act = f"open('note', 'w').write('x'); import os; os.remove('note'); {CLOSES}"
+    assert [episode.failure for episode in play(made(act))] == [""] * 3
+
+
+def test_nan_fails_one_episode_and_a_crash_those_that_were_played(made: Callable[[str], str]):
+    """With two slots the third episode begins after the crash, in a process started again."""
+    nan = play(made("a = np.zeros((len(states), 1)); a[0] = np.nan; return a"), CASES[:2])
+    assert [episode.failure for episode in nan] == ["action is nan at step 0", ""]
+    act = "import os; os.path.exists('been') or (open('been', 'w').close(), os._exit(1)); " + CLOSES
+    first, second, third = play(made(act))
+    assert first.failure == second.failure == "it ended with code 1 at step 0"
+    assert third.failure == ""
+    assert len(third.actions) > 10
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("exit()", "did not start: it ended with code 0"),
+        ("print('hi', flush=True)", "where a JSON object on one line was due"),
+        ("print('{}', flush=True)", 'its first line must be {"protocol": 1}'),
+        ("print('x' * 10000, flush=True)", "its answer is longer than 4096 bytes"),
+    ],
+)
+def test_a_program_that_does_not_speak_the_protocol_is_named(tmp_path: Path, line: str, why: str):
+    (tmp_path / "agent.py").write_text(f"input()\n{line}\ninput()\n")
+    with pytest.raises(AgentError, match="the agent") as caught:
+        play(f"exec:{sys.executable} {tmp_path}/agent.py")
+    assert why in str(caught.value)
+
+
+PROGRAM = """
+import json, sys
+print(json.dumps({"protocol": json.loads(input())["protocol"]}), flush=True)
+for line in sys.stdin:
+    print(json.dumps({"actions": [0.5 for _ in json.loads(line)["states"]]}), flush=True)
+"""
+
+
+def test_a_program_in_any_language_plays(tmp_path: Path):
+    (tmp_path / "agent.py").write_text(PROGRAM)
+    for episode in play(f"exec:{sys.executable} {tmp_path}/agent.py"):
+        assert episode.failure == ""
+        assert (episode.actions == 0.5).all()
+
+
+def test_a_program_that_is_not_there_is_named():
+    with pytest.raises(AgentError, match="No such file or directory: 'no-such-program'"):
+        play("exec:no-such-program")
+
+
+def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
+    class Closes(torch.nn.Module):
+        def forward(self, states: torch.Tensor) -> torch.Tensor:
+            return torch.tanh(states[:, :1] * 0.0 + 0.25)
+
+    file = tmp_path / "policy.pt"
+    torch.jit.save(torch.jit.script(Closes()), str(file))
+    for episode in play(str(file), CASES[:1]):
+        np.testing.assert_allclose(episode.actions, np.tanh(0.25), atol=1e-7)
+    torch.save({"weights": 1}, file)
+    with pytest.raises(AgentError, match="is no TorchScript file"):
+        play(str(file))
+    with pytest.raises(policies.BadPolicy, match=r"known kinds end in \.pt, \.onnx"):
+        policies.load(tmp_path / "policy.pkl")
+
+
+@given(st.binary(max_size=200), st.integers(1, 5))
+def test_whatever_a_process_writes_is_actions_or_a_bad_answer(line: bytes, count: int):
+    with suppress(wire.BadAnswer):
+        assert wire.actions(line, count).shape == (count, 1)
+
+
+@given(st.lists(st.floats(), min_size=1, max_size=5))
+def test_actions_come_through_bit_for_bit(actions: list[float]):
+    sent = np.array(actions)[:, None]
+    np.testing.assert_array_equal(wire.actions(wire.answer(sent), len(actions)), sent)
+    states = np.array(actions)[:, None].repeat(48, axis=1)
+    rows, found = wire.asked(wire.question([0], states))
+    assert rows.tolist() == [0]
+    np.testing.assert_array_equal(found, states)
