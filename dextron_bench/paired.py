@@ -84,9 +84,9 @@ def ranks(means: Sequence[float], resamples: Sequence[np.ndarray]) -> list[int]:
     same settings. Where means are equal, resamples decide who opens, so that the order of methods does not.
     """
     order = sorted(range(len(means)), key=lambda each: (-means[each], resamples[each].tolist()))
-    found, opener = [0] * len(means), -1
+    found, rank, opener = [0] * len(means), 0, -1
     for place, each in enumerate(order, start=1):
-        if opener < 0 or _apart(resamples[opener] - resamples[each]):
+        if rank == 0 or _apart(resamples[opener] - resamples[each]):
             opener, rank = each, place
         found[each] = rank
     return found
