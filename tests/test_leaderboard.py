@@ -101,3 +101,14 @@ def test_the_interquartile_mean_is_over_the_regions_of_a_split_that_ships():
 def test_results_of_unequal_length_are_refused():
     with pytest.raises(leaderboard.UnevenResults, match="test of real, version aaaaaaaa"):
         leaderboard.table([result("a", 0, [1.0]), result("b", 0, [1.0, 2.0])])
+
+
+def test_seeds_of_two_methods_are_drawn_apart():
+    """A's seeds are 1 better than B's, but spread by 10: drawn together, the difference would always be 1."""
+    seeds = (0.0, 9.0, 18.0)
+    made = [
+        result(method, k, [lead + mean] * 50)
+        for method, lead in (("a", 1.0), ("b", 0.0))
+        for k, mean in enumerate(seeds)
+    ]
+    assert column(made, "rank") == {"a": 1, "b": 1}
