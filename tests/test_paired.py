@@ -130,6 +130,14 @@ def test_pairs_are_told_apart_by_the_noise_of_their_difference():
     assert paired.ranks([10.0, 9.9], [10.0 + common, 9.9 + common]) == [1, 2]
 
 
+def test_of_equal_means_the_same_one_opens_the_group_in_any_order():
+    """The third is told apart from the one that is sure, not from the one that is unsure."""
+    (noise,) = around(0.0)
+    sure, unsure, third = np.full(stats.RESAMPLES, 10.0), 10.0 + noise, np.full(stats.RESAMPLES, 9.5)
+    one, other, last = paired.ranks([10.0, 10.0, 9.5], [sure, unsure, third])
+    assert paired.ranks([10.0, 10.0, 9.5], [unsure, sure, third]) == [other, one, last]
+
+
 def test_nobody_has_no_rank():
     assert paired.ranks([], []) == []
 
