@@ -16,6 +16,7 @@ from typing import Annotated, Any, Protocol, Union
 import tyro
 
 from dextron_bench.verbs import (
+    compare,
     data,
     data_export,
     data_model,
@@ -57,6 +58,7 @@ VERBS: dict[str, type[Verb] | Group] = {
         },
     ),
     "submit": submit.Submit,
+    "compare": compare.Compare,
     "view": view.View,
     "recordings": (
         "Recordings: list them, export one as a film or a table, choose a few of the runs'.",

@@ -15,11 +15,13 @@ from mpl_toolkits.mplot3d import Axes3D
 from dextron_bench.world.setting import Setting, Source, Stratum, from_frame
 
 if TYPE_CHECKING:
+    from dextron_bench.comparison import Comparison
     from dextron_bench.success.explanation import Foresight
 
 RIDGES = 40  # Curves of an episode, about.
 FORMATS = (".pdf", ".png", ".svg")
 HUES = ("Blues", "Oranges", "Greens", "Greys")  # One for each angle; a ring farther out is darker.
+BETTER, WORSE = "tab:blue", "tab:orange"
 BOTTLE_RADIUS, BOTTLE_HEIGHT = 0.025, 0.25  # [m]
 
 
@@ -139,6 +141,31 @@ def ridges(episodes: dict[str, Foresight], file: Path) -> None:
         axes.set_title(title, fontsize=8, wrap=True)
         axes.set(xlabel="action", xlim=(-1.0, 1.0))
     panels[0].set_ylabel("time, as a share of the reach")
+    figure.savefig(file, dpi=150)
+
+
+def differences(found: Comparison, file: Path) -> None:
+    """Draws what B scores more than A: its mean and interval in every group, and each setting's own, in order of size.
+
+    Blue is better, orange worse, grey not told from none. Raises UnknownFormat, OSError.
+    """
+    _check(file)
+    groups = found.groups.iloc[::-1]
+    figure = Figure(figsize=(10, 1.5 + 0.22 * max(len(groups), 12)), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for place, row in enumerate(groups.to_dict("records")):
+        colour = BETTER if row["low"] > 0.0 else WORSE if row["high"] < 0.0 else "0.5"
+        left.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=2)
+        left.plot(row["difference"], place, "o", color=colour, markersize=4)
+    left.set_yticks(range(len(groups)), [f"{row.group} ({row.rows})" for row in groups.itertuples()], fontsize=8)
+    left.set(xlabel="difference of mean return, with its 95 % interval", title="Groups (settings)")
+    each = np.sort(found.b.scores.mean(axis=0) - found.a.scores.mean(axis=0))
+    right.bar(np.arange(len(each)), each, width=1.0, color=np.where(each > 0.0, BETTER, WORSE))
+    right.set(xlabel="settings, in order", ylabel="difference of return", ylim=(-20.5, 20.5), title="Each setting")
+    for draw in (left.axvline, right.axhline):
+        draw(0.0, color="black", linewidth=0.8)
+    split = f"{found.a.split} of {found.a.reaches} reaches"
+    figure.suptitle(f"What {found.b.name} scores more than {found.a.name} on {split}", fontsize=10)
     figure.savefig(file, dpi=150)
 
 

@@ -3,53 +3,101 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from dextron_bench import stats
+from dextron_bench import methods, paired, stats, strata
 from dextron_bench.diagnosis import CAUSES
 from dextron_bench.world import task
 
 COLUMNS = (
-    "method", "reaches", "split", "version", "seeds", "episodes", "failed",
-    "return", "return_low", "return_high", "success", "success_low", "success_high", *CAUSES, "closing_lag",
+    "rank", "method", "reaches", "split", "version", "seeds", "episodes", "failed",
+    "return", "return_low", "return_high", "success", "success_low", "success_high",
+    "iqm", "iqm_low", "iqm_high", "regret", *CAUSES, "closing_lag",
 )  # fmt: skip
+CONTESTED = ("real", "synthetic")  # Sources on which methods are ranked; SIM's own world is none.
+Board = dict[str, list[dict[str, Any]]]  # By method, what each of its seeds scored on one version of a split.
+
+
+class UnevenResults(ValueError):
+    """Results of one version of a split that have not the same number of rows."""
 
 
 def table(results: Iterable[dict[str, Any]]) -> pd.DataFrame:
     """One row for each method, source, split and split version, best first, with the columns COLUMNS.
 
     `results` are the contents of `result.json` files, one a seed. Success rates lie in [0, 1], the columns CAUSES are
-    numbers of episodes, `closing_lag` [s] is the mean over seeds of their medians, NaN where no hand closed.
+    numbers of episodes, `closing_lag` [s] is the mean over seeds of their medians, NaN where no hand closed. `rank` is
+    NaN for who is no entrant, `iqm` where the split is not one that ships, `regret` where EXP has no scores.
+    Raises UnevenResults.
     """
-    rows = pd.DataFrame([_row(key, seeds) for key, seeds in _groups(results).items()], columns=list(COLUMNS))
-    return rows.sort_values(
+    found = [row for key, board in _boards(results).items() for row in _rows(key, board)]
+    return pd.DataFrame(found, columns=list(COLUMNS)).sort_values(
         ["reaches", "split", "return", "method"], ascending=[True, True, False, True], ignore_index=True
     )
 
 
-def _groups(results: Iterable[dict[str, Any]]) -> dict[tuple[str, str, str, str], list[dict[str, Any]]]:
-    """What each seed scored, by method, source of reaches, split and its digest."""
-    groups: dict[tuple[str, str, str, str], list[dict[str, Any]]] = defaultdict(list)
+def is_entrant(method: str, reaches: str) -> bool:
+    """Whether a method is ranked: not the ceiling, which is told each setting's expert, and not in SIM's own world."""
+    return method not in methods.CEILINGS and reaches in CONTESTED
+
+
+def _boards(results: Iterable[dict[str, Any]]) -> dict[tuple[str, str, str], Board]:
+    """What can be compared: the scores of all methods by source of reaches, split and its digest."""
+    boards: dict[tuple[str, str, str], Board] = defaultdict(lambda: defaultdict(list))
     for result in results:
         for name, found in result["splits"].items():
-            groups[(result["method"], result["reaches"], name, found["digest"])].append(found)
-    return groups
+            boards[(result["reaches"], name, found["digest"])][result["method"]].append(found)
+    return boards
 
 
-def _row(key: tuple[str, ...], seeds: list[dict[str, Any]]) -> list[Any]:
-    method, reaches, split, digest = key
-    scores = np.array([found["scores"] for found in seeds], float)
-    mean = stats.estimate(scores, np.random.default_rng(0))
-    success = stats.estimate(np.equal(scores, task.SUCCESS).astype(float), np.random.default_rng(0))
-    failed = sum(found["failed"] for found in seeds)
-    causes = [sum(found["causes"].get(cause, 0) for found in seeds) for cause in CAUSES]
+def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
+    """The rows of a board. A method's numbers do not depend on who else is there, but for its rank."""
+    reaches, split, digest = key
+    lengths = {len(found["scores"]) for seeds in board.values() for found in seeds}
+    if len(lengths) > 1:
+        raise UnevenResults(f"results on {split} of {reaches}, version {digest[:8]}, differ in their number of rows")
+    scores = {method: np.array([found["scores"] for found in seeds], float) for method, seeds in board.items()}
+    settings = stats.drawn(lengths.pop(), np.random.default_rng(0))
+    resamples = {method: stats.resampled(each, settings, _stream(method)) for method, each in scores.items()}
+    ranks = _ranks({method: each for method, each in scores.items() if is_entrant(method, reaches)}, resamples)
+    regions = strata.regions(reaches, split, digest)
+    ceiling = next((scores[method].mean() for method in methods.CEILINGS if method in scores), np.nan)
+    for method, each in scores.items():
+        solved = np.equal(each, task.SUCCESS).astype(float)
+        yield {
+            **dict(zip(("reaches", "split", "version"), (reaches, split, digest[:8]), strict=True)),
+            **{"rank": ranks.get(method, np.nan), "method": method, "seeds": len(each), "episodes": each.size},
+            **_spread("return", stats.interval(float(each.mean()), resamples[method])),
+            **_spread("success", stats.interval(solved.mean(), stats.resampled(solved, settings, _stream(method)))),
+            **(_spread("iqm", stats.interquartile_mean(each, regions, _stream(method))) if regions is not None else {}),
+            "regret": ceiling - each.mean(),
+            **_endings(board[method]),
+        }
+
+
+def _ranks(scores: Mapping[str, np.ndarray], resamples: Mapping[str, np.ndarray]) -> dict[str, int]:
+    found = paired.ranks([each.mean() for each in scores.values()], [resamples[method] for method in scores])
+    return dict(zip(scores, found, strict=True))
+
+
+def _stream(method: str) -> np.random.Generator:
+    """Each method's own random numbers, so that methods' seeds are drawn independently and one more changes none."""
+    return np.random.default_rng([0, *method.encode()])
+
+
+def _spread(name: str, found: stats.Estimate) -> dict[str, float]:
+    return {name: found.mean, f"{name}_low": found.low, f"{name}_high": found.high}
+
+
+def _endings(seeds: list[dict[str, Any]]) -> dict[str, Any]:
+    """How the episodes of all seeds end."""
     lags = [found["closing_lag"] for found in seeds if found["closing_lag"] is not None]
-    return [
-        method, reaches, split, digest[:8], len(seeds), scores.size, failed,
-        mean.mean, mean.low, mean.high, success.mean, success.low, success.high,
-        *causes, float(np.mean(lags)) if lags else np.nan,
-    ]  # fmt: skip
+    return {
+        "failed": sum(found["failed"] for found in seeds),
+        **{cause: sum(found["causes"].get(cause, 0) for found in seeds) for cause in CAUSES},
+        "closing_lag": float(np.mean(lags)) if lags else np.nan,
+    }

@@ -26,6 +26,7 @@ PAPER: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of its figure 4a, 
     ("rlil", {"dur": 0.3}),
 )
 FLOORS = "nothing", "random"  # Methods that decide nothing: what others are to be seen beside.
+CEILINGS = ("exp",)  # Methods that are told each setting's own expert: no entrants, but what can be reached.
 
 
 class Method(Protocol):

@@ -117,17 +117,18 @@ def _picture(reaches: str) -> str:
 def _sections(rows: pd.DataFrame, drawn: set[str]) -> Iterator[str]:
     """The README's tables, as Markdown: for each source, scores on every split, then how episodes of `test` end.
 
-    Sources in `drawn` have a picture of learning curves.
+    Ranks are those on `test`. Sources in `drawn` have a picture of learning curves.
     """
     for reaches, group in rows.groupby("reaches", sort=False):
         names = [name for name in splits.NAMES if name in set(group["split"])]
         ranked = group[group["split"] == "test"]["method"].tolist()
         yield f"\n## {reaches} reaches\nMean return of 20 with its 95 % interval, and successes [%].\n"
-        yield _line(["method", "seeds", *(f"`{name}`" for name in names)])
-        yield _line(["---"] * (2 + len(names)))
+        yield _line(["rank", "method", "seeds", *(f"`{name}`" for name in names)])
+        yield _line(["---"] * (3 + len(names)))
         for method in ranked:
             own = group[group["method"] == method].set_index("split")
-            yield _line([f"`{method}`", own["seeds"].iloc[0], *(_score(own, name) for name in names)])
+            cells = [f"{own['rank'].loc['test']:.0f}".replace("nan", ""), f"`{method}`", own["seeds"].iloc[0]]
+            yield _line([*cells, *(_score(own, name) for name in names)])
         if reaches in drawn:
             yield f"\n![Learning curves on {reaches} reaches]({_picture(str(reaches))})"
         yield "\nHow episodes of `test` end [%] ([docs/diagnosis.md](../docs/diagnosis.md)); closing lag in seconds.\n"

@@ -273,6 +273,7 @@ def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
         ["mc"],
         ["run"],
         ["eval"],
+        ["compare"],
         ["success", "data"],
         ["success", "train"],
         ["success", "eval"],

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from dextron_bench import splits
-from dextron_bench.strata import strata
+from dextron_bench.strata import REGION, SUBJECT, by_stratum, regions, strata
 from dextron_bench.world.setting import Source
 
 
@@ -25,3 +27,31 @@ def test_a_recorded_reach_says_by_its_name_whose_it_is():
     row = next(i for i, case in enumerate(split.cases) if case.setting.reach.endswith("_11"))
     found = strata(split).iloc[row]
     assert (found["subject"], found["ring"], found["angle"]) == (split.cases[row].setting.reach[:2], 2, 2)
+
+
+def test_groups_have_means_over_seeds_and_rows():
+    """Rows 0 and 2 are of one subject: seeds score 20 and 10, then 0 and 20."""
+    rows = pd.DataFrame({"subject": ["x", "y", "x"], "ring": [0, 0, 3], "angle": [1, 1, 2]})
+    scores = np.array([[20.0, 4.0, 10.0], [0.0, 4.0, 20.0]])
+    people = by_stratum(scores, rows, SUBJECT)
+    assert people.to_dict("list") == {
+        "subject": ["x", "y"],
+        "rows": [2, 1],
+        "return": [12.5, 4.0],
+        "success": [0.5, 0.0],
+    }
+    places = by_stratum(scores, rows, REGION)
+    assert places[["ring", "angle", "rows", "return"]].to_numpy().tolist() == [[0, 1, 2, 7.0], [3, 2, 1, 15.0]]
+
+
+def test_regions_are_numbered_by_ring_then_angle():
+    split = splits.load("real", "test")
+    found = strata(split)
+    numbers = regions("real", "test", split.digest)
+    assert numbers is not None
+    assert numbers.tolist() == [4 * ring + angle for ring, angle in zip(found["ring"], found["angle"], strict=True)]
+
+
+@pytest.mark.parametrize(("name", "digest"), [("test", "0" * 64), ("nowhere", "0" * 64)])
+def test_a_split_that_does_not_ship_has_no_strata(name: str, digest: str):
+    assert regions("real", name, digest) is None

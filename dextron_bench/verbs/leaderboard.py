@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,17 +69,34 @@ def print_rows(rows: pd.DataFrame, as_json: bool) -> None:
         failed = bool(group["failed"].any())
         cells = [
             [
+                "" if isnan(row["rank"]) else f"{row['rank']:.0f}",
                 row["method"],
-                f"{row['return']:.2f} [{row['return_low']:.2f}, {row['return_high']:.2f}]",
-                f"{100 * row['success']:.1f} [{100 * row['success_low']:.1f}, {100 * row['success_high']:.1f}]",
+                _interval(row, "return", 2),
+                _interval(row, "success", 1, 100.0),
+                "" if isnan(row["iqm"]) else _interval(row, "iqm", 2),
+                "" if isnan(row["regret"]) else f"{row['regret']:.2f}",
                 row["seeds"],
                 row["episodes"],
                 *([row["failed"]] if failed else []),
             ]
             for row in group.to_dict("records")
         ]
-        columns = ["method", "return [95 %]", "success % [95 %]", "seeds", "episodes", *(["failed"] if failed else [])]
+        columns = [
+            "rank",
+            "method",
+            "return [95 %]",
+            "success % [95 %]",
+            "interquartile mean [95 %]",
+            "regret",
+            "seeds",
+        ]
+        columns += ["episodes", *(["failed"] if failed else [])]
         print_table(f"{reaches} reaches, split {split}, version {group['version'].iloc[0]}", columns, cells)
+
+
+def _interval(row: Mapping[Any, Any], name: str, digits: int, unit: float = 1.0) -> str:
+    mean, low, high = (f"{unit * row[column]:.{digits}f}" for column in (name, f"{name}_low", f"{name}_high"))
+    return f"{mean} [{low}, {high}]"
 
 
 def print_endings(rows: pd.DataFrame) -> None:
