@@ -48,8 +48,8 @@ VERBS: dict[str, type[Verb] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
     "leaderboard": (
-        "The leaderboard: show that of a folder of runs, build the published one.",
-        {"show": leaderboard.Show, "build": leaderboard.Build},
+        "The leaderboard: show that of a folder of runs, build the published one, serve its page.",
+        {"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
     ),
     "view": view.View,
     "recordings": (

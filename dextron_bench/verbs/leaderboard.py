@@ -1,7 +1,8 @@
-"""`dextron-bench leaderboard`: the rows of all runs in a folder, and the published ones."""
+"""`dextron-bench leaderboard`: the rows of all runs in a folder, the published ones, and their page."""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,6 +53,33 @@ class Build:
         if self.runs is not None:
             print(*publication.take(self.runs, self.into), sep="\n")
         print(*publication.build(self.into), sep="\n")
+        return 0
+
+
+@dataclass(frozen=True)
+class Serve:
+    """Serve the leaderboard's page to this machine alone, recordings opened in Rerun's web viewer; Ctrl-C ends it.
+
+    Example: dextron-bench leaderboard serve --port 8000
+    """
+
+    port: int = 8765
+    """Where to listen on 127.0.0.1; 0 takes a free port."""
+    into: Path = Path("leaderboard")
+    """Folder of the leaderboard, beside that of its recordings."""
+
+    def __call__(self) -> int:
+        from dextron_bench import serving
+        from dextron_bench.recording import ViewerError, web_viewer
+
+        try:
+            viewer = web_viewer()
+        except ViewerError as error:
+            viewer = {}
+            print(f"dextron-bench: recordings are downloaded: {error}", file=sys.stderr)
+        with serving.open_server(serving.Site(self.into, viewer), self.port) as server:
+            print(f"http://{serving.LOOPBACK}:{server.server_port}/", flush=True)
+            server.serve_forever()
         return 0
 
 
