@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 from dextron_bench.page import FILE
 from dextron_bench.page.showreel import FOLDER
@@ -48,10 +48,10 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """What is served: a leaderboard's folder, and the viewer's files by name with their kinds, if there are any."""
+    """What is served: a leaderboard's folder, and the viewer's files by name with their kinds, once there are any."""
 
     board: Path
-    viewer: Mapping[str, tuple[str, bytes]]
+    viewer: dict[str, tuple[str, bytes]] = field(default_factory=dict)
 
     def answer(self, path: str, host: str) -> Answer | None:
         """What lies at a path, for whom reaches this server as `host`; None where nothing does."""
@@ -78,22 +78,28 @@ class Site:
         return LINK.sub(opened, text)
 
 
-def open_server(site: Site, port: int) -> ThreadingHTTPServer:
-    """A server of the site, reachable from this machine only; port 0 takes a free one. Raises NoPage, OSError."""
-    if not (site.board / FILE).is_file():
-        raise NoPage(f"{site.board} has no {FILE}; `dextron-bench leaderboard build --into {site.board}` makes it")
+class Server(ThreadingHTTPServer):
+    """Offers a site to this machine alone."""
 
-    class Handler(_Handler):
-        pass
+    daemon_threads = True
 
-    Handler.site = site
-    return ThreadingHTTPServer((LOOPBACK, port), Handler)
+    def __init__(self, site: Site, port: int) -> None:
+        """Listens at a port, 0 for a free one. Raises NoPage, OSError."""
+        if not (site.board / FILE).is_file():
+            raise NoPage(f"{site.board} has no {FILE}; `dextron-bench leaderboard build --into {site.board}` makes it")
+        self.site = site
+        super().__init__((LOOPBACK, port), _Handler)
+
+    @property
+    def address(self) -> str:
+        """Where a browser finds it."""
+        return f"http://{LOOPBACK}:{self.server_port}/"
 
 
 class _Handler(BaseHTTPRequestHandler):
     """Answers GET and HEAD with what the site has, and everything else with an error."""
 
-    site: Site
+    server: Server  # pyright: ignore[reportIncompatibleVariableOverride]
     server_version, sys_version = "dextron-bench", ""
     protocol_version = "HTTP/1.1"
     timeout = 60  # [s] after which a silent connection is closed.
@@ -105,12 +111,11 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(with_body=False)
 
     def _answer(self, with_body: bool) -> None:
-        assert isinstance(self.server, ThreadingHTTPServer)
-        host, port = self.headers.get("Host", ""), self.server.server_port
-        if host not in {f"{name}:{port}" for name in NAMES}:
+        host = self.headers.get("Host", "")
+        if host not in {f"{name}:{self.server.server_port}" for name in NAMES}:
             self.send_error(HTTPStatus.FORBIDDEN, "only this machine is served")
             return
-        found = self.site.answer(self.path.partition("?")[0], host)
+        found = self.server.site.answer(unquote(self.path.partition("?")[0]), host)
         if found is None:
             self.send_error(HTTPStatus.NOT_FOUND)
             return

@@ -61,7 +61,8 @@ def _columns(known: set[str], links: Links) -> list[Column]:
 def _heading(column: Column) -> Html:
     hint = tag("small", column.hint) if column.hint else None
     button = tag("button", column.title, type="button", data_sort="number" if column.number else "text")
-    return tag("th", button, hint, scope="col", aria_sort="none", class_="number" if column.number else None)
+    kind = "number" if column.number else None
+    return tag("th", button, hint, scope="col", aria_sort="none", class_=kind, data_name=column.title)
 
 
 def _row(entry: Entry, columns: Sequence[Column]) -> Html:

@@ -72,13 +72,12 @@ class Serve:
         from dextron_bench import serving
         from dextron_bench.recording import ViewerError, web_viewer
 
-        try:
-            viewer = web_viewer()
-        except ViewerError as error:
-            viewer = {}
-            print(f"dextron-bench: recordings are downloaded: {error}", file=sys.stderr)
-        with serving.open_server(serving.Site(self.into, viewer), self.port) as server:
-            print(f"http://{serving.LOOPBACK}:{server.server_port}/", flush=True)
+        with serving.Server(serving.Site(self.into), self.port) as server:
+            try:
+                server.site.viewer.update(web_viewer())
+            except ViewerError as error:
+                print(f"dextron-bench: recordings will be downloaded, not opened: {error}", file=sys.stderr)
+            print(server.address, flush=True)
             server.serve_forever()
         return 0
 
