@@ -37,7 +37,7 @@ class Show:
 
 @dataclass(frozen=True)
 class Build:
-    """Make the published leaderboard's tables and pictures from its results, after those of finished runs are added.
+    """Make the published leaderboard's tables, pictures and page from its results, after finished runs' are added.
 
     Example: dextron-bench leaderboard build --runs runs --into leaderboard
     """
