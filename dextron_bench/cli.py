@@ -51,9 +51,9 @@ VERBS: dict[str, type[Verb] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
     "leaderboard": (
-        "The leaderboard: show that of a folder of runs, build the published one, verify it and what is submitted.",
+        "The leaderboard: show that of a folder of runs; build, serve and verify the published one; add to it.",
         {
-            **{"show": leaderboard.Show, "build": leaderboard.Build},
+            **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
             **{"verify": verification.Verify, "add": verification.Add},
         },
     ),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from matplotlib import colormaps
+from matplotlib import colormaps, rc_context
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from mpl_toolkits.mplot3d import Axes3D
@@ -22,6 +24,13 @@ RIDGES = 40  # Curves of an episode, about.
 FORMATS = (".pdf", ".png", ".svg")
 HUES = ("Blues", "Oranges", "Greens", "Greys")  # One for each angle; a ring farther out is darker.
 BETTER, WORSE = "tab:blue", "tab:orange"
+DATES = {".pdf": "CreationDate", ".svg": "Date"}  # Left out, so that equal figures have equal bytes.
+INK = "#010203"  # Stands for the page's own colour in pictures that are part of it.
+INLINE: Any = {  # Text stays text there, in the page's font; nothing is drawn behind.
+    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
+    **{"svg.fonttype": "none", "savefig.transparent": True, "legend.frameon": False, "text.parse_math": False},
+    **{"axes.spines.top": False, "axes.spines.right": False},
+}
 BOTTLE_RADIUS, BOTTLE_HEIGHT = 0.025, 0.25  # [m]
 
 
@@ -55,7 +64,7 @@ def reach_paths(source: Source, file: Path) -> None:
     handles, labels = axes.get_legend_handles_labels()
     order = np.argsort(labels)
     axes.legend([handles[i] for i in order], [labels[i] for i in order], fontsize=6, ncols=4, loc="upper center")
-    figure.savefig(file, dpi=200)
+    _save(figure, file, 200)
 
 
 def start_points(source: Source, rows: pd.DataFrame, file: Path) -> None:
@@ -76,7 +85,7 @@ def start_points(source: Source, rows: pd.DataFrame, file: Path) -> None:
     axes.legend(title="start regions; darker is farther", loc="lower left")
     axes.set(xlabel="x [m]", ylabel="y [m]", title=f"Starts of {len(rows)} solved {source.name} settings")
     axes.set_aspect("equal")
-    figure.savefig(file, dpi=200)
+    _save(figure, file, 200)
 
 
 def learning_curves(curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFrame, file: Path) -> None:
@@ -100,7 +109,7 @@ def learning_curves(curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFra
     axes.set(xlabel="epochs of 1,000 frames", ylabel="sum of rewards", ylim=(0.0, 20.5), xlim=(0.0, None))
     axes.set_title("Mean and range over seeds on 50 settings of val")
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
-    figure.savefig(file, dpi=150)
+    _save(figure, file, 150)
 
 
 def success_curve(points: list[dict[str, float]], file: Path) -> None:
@@ -116,7 +125,7 @@ def success_curve(points: list[dict[str, float]], file: Path) -> None:
         axes.plot(table.index, table[f"test_{name}"], label="episodes held out")
         axes.set(xlabel="epoch", ylabel="cross entropy" if name == "loss" else name)
         axes.legend(fontsize=8)
-    figure.savefig(file, dpi=150)
+    _save(figure, file, 150)
 
 
 def ridges(episodes: dict[str, Foresight], file: Path) -> None:
@@ -141,7 +150,22 @@ def ridges(episodes: dict[str, Foresight], file: Path) -> None:
         axes.set_title(title, fontsize=8, wrap=True)
         axes.set(xlabel="action", xlim=(-1.0, 1.0))
     panels[0].set_ylabel("time, as a share of the reach")
-    figure.savefig(file, dpi=150)
+    _save(figure, file, 150)
+
+
+def inline(draw: Callable[[Path], None]) -> str:
+    """The SVG that `draw` saves to a file, to stand in a page: INK and black are for the page to choose."""
+    with TemporaryDirectory() as folder, rc_context(INLINE):
+        file = Path(folder) / "picture.svg"
+        draw(file)
+        return file.read_text(encoding="utf-8")
+
+
+def _save(figure: Figure, file: Path, dpi: int) -> None:
+    """Writes a figure so that the same one gives the same bytes."""
+    date = DATES.get(file.suffix.lower())
+    with rc_context({"svg.hashsalt": "dextron-bench"}):
+        figure.savefig(file, dpi=dpi, metadata={date: None} if date else None)
 
 
 def differences(found: Comparison, file: Path) -> None:

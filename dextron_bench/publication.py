@@ -47,13 +47,15 @@ def take(runs: Path, into: Path) -> list[Path]:
 
 
 def build(into: Path) -> list[Path]:
-    """Makes the table (CSV), its short form in the README, and the learning curves from the folder's results.
+    """Makes the table (CSV), its short form in the README, learning curves and the page from the folder's results.
 
-    Returns the files; raises DamagedRun.
+    The page links to recordings in the folder beside. Returns the files; raises DamagedRun, BrokenRecording.
     """
-    from dextron_bench import figures
+    from dextron_bench import figures, page
+    from dextron_bench.page.showreel import FOLDER
 
-    rows = leaderboard.table(records.results(into / RESULTS))
+    results = list(records.results(into / RESULTS))
+    rows = leaderboard.table(results)
     made = [into / "table.csv", into / "README.md"]
     provenance.write_whole(made[0], lambda part: rows.to_csv(part, index=False, float_format="%.6g"))
     curves: dict[str, dict[str, Curves]] = defaultdict(dict)
@@ -63,6 +65,9 @@ def build(into: Path) -> list[Path]:
     for reaches, found in curves.items():
         made.append(into / _picture(reaches))
         figures.learning_curves(found, rows[rows["reaches"] == reaches], made[-1])
+    made.append(into / page.FILE)
+    text = page.document(rows, results, curves, into.resolve().parent / FOLDER)
+    provenance.write_whole(made[-1], lambda part: part.write_text(text, encoding="utf-8"))
     return made
 
 

@@ -35,11 +35,12 @@ def test_a_result_is_whole_and_of_the_splits_that_ship(file: Path):
         assert found["failed"] == 0
 
 
-def test_tables_and_curves_are_rebuilt_from_the_results(tmp_path: Path):
+def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
     again = tmp_path / "board"
     shutil.copytree(BOARD, again)
+    (tmp_path / "recordings").symlink_to(BOARD.parent / "recordings")
     assert cli.main(["leaderboard", "build", "--into", str(again)]) == 0
-    for made in ("README.md", "table.csv"):
+    for made in ("README.md", "table.csv", "index.html"):
         assert (again / made).read_text() == (BOARD / made).read_text()
     assert {file.name for file in again.glob("*.png")} == {file.name for file in BOARD.glob("*.png")}
 

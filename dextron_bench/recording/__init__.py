@@ -9,6 +9,7 @@ from dextron_bench.recording.properties import ReaderError, Summary, read_safely
 from dextron_bench.recording.stage import Stage, theatre
 from dextron_bench.recording.storage import UnwritableRecording
 from dextron_bench.recording.viewer import ViewerError, screenshots, view
+from dextron_bench.recording.webviewer import web_viewer
 
 __all__ = [
     "BrokenRecording",
@@ -27,5 +28,6 @@ __all__ = [
     "summarise",
     "theatre",
     "view",
+    "web_viewer",
     "write",
 ]

@@ -1,7 +1,8 @@
-"""`dextron-bench leaderboard`: the rows of all runs in a folder, and the published ones."""
+"""`dextron-bench leaderboard`: the rows of all runs in a folder, the published ones, and their page."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan
@@ -38,7 +39,7 @@ class Show:
 
 @dataclass(frozen=True)
 class Build:
-    """Make the published leaderboard's tables and pictures from its results, after those of finished runs are added.
+    """Make the published leaderboard's tables, pictures and page from its results, after finished runs' are added.
 
     Example: dextron-bench leaderboard build --runs runs --into leaderboard
     """
@@ -54,6 +55,32 @@ class Build:
         if self.runs is not None:
             print(*publication.take(self.runs, self.into), sep="\n")
         print(*publication.build(self.into), sep="\n")
+        return 0
+
+
+@dataclass(frozen=True)
+class Serve:
+    """Serve the leaderboard's page to this machine alone, recordings opened in Rerun's web viewer; Ctrl-C ends it.
+
+    Example: dextron-bench leaderboard serve --port 8000
+    """
+
+    port: int = 8765
+    """Where to listen on 127.0.0.1; 0 takes a free port."""
+    into: Path = Path("leaderboard")
+    """Folder of the leaderboard, beside that of its recordings."""
+
+    def __call__(self) -> int:
+        from dextron_bench import serving
+        from dextron_bench.recording import ViewerError, web_viewer
+
+        with serving.Server(serving.Site(self.into), self.port) as server:
+            try:
+                server.site.viewer.update(web_viewer())
+            except ViewerError as error:
+                print(f"dextron-bench: recordings will be downloaded, not opened: {error}", file=sys.stderr)
+            print(server.address, flush=True)
+            server.serve_forever()
         return 0
 
 
