@@ -34,6 +34,11 @@ class Bc(Scheduled):
 
     name: ClassVar[str] = "bc"
 
+    @property
+    def demonstrated(self) -> int:
+        """Expert transitions in each batch: all."""
+        return BATCH
+
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """One network a seed, side by side."""
         schedule = SCHEDULES[self.preset]

@@ -20,11 +20,6 @@ class Rl(Scheduled):
 
     name: ClassVar[str] = "rl"
 
-    @property
-    def demonstrated(self) -> int:
-        """Expert transitions in each batch."""
-        return 0
-
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """One SAC agent a seed, side by side."""
         return Cycle(track, seeds, SCHEDULES[self.preset], self.demonstrated)

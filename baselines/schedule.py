@@ -60,6 +60,16 @@ class Scheduled:
         return SCHEDULES[self.preset].period
 
     @property
+    def demonstrated(self) -> int:
+        """Expert transitions in each batch."""
+        return 0
+
+    def demonstrations(self, episodes: int) -> int:
+        """Expert episodes that it learns from, of so many in `train`."""
+        least = SCHEDULES[self.preset].episodes or episodes
+        return min(least, episodes) if self.demonstrated else 0
+
+    @property
     def rehearsal(self) -> Self:
         """The shortest preset: all updates of its last epoch are made, as in those of the others."""
         return replace(self, preset="smoke")

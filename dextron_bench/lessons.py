@@ -68,6 +68,11 @@ class Course:
         """Where a group trains."""
         return training.folder_of(self._base, group)
 
+    def seconds(self, seed: int) -> float | None:
+        """How long the training of a seed's group took; None where its folder is not there."""
+        found = [each for each in self._over() if seed in each]
+        return training.seconds(self.folder(found[0])) if found else None
+
     @property
     def _base(self) -> Path:
         return self.runs / self.learner.label / self.reaches

@@ -12,7 +12,7 @@ import pandas as pd
 from dextron_bench import lessons, methods, records, splits, training, weights
 from dextron_bench.learning import Heir, Learner
 from dextron_bench.methods import Entrant
-from dextron_bench.rollout import Agent, Episode, blaming, rollout
+from dextron_bench.rollout import Agent, Episode, Privileged, blaming, rollout
 from dextron_bench.world import sources
 from dextron_bench.world.setting import Source
 
@@ -105,8 +105,22 @@ def execute(plan: Plan, runs: Path, threads: int = 0, report: Report = quiet) ->
         return rollout(agent(method, plan.seed, trained), source, split.cases, threads=threads)
 
     episodes = evaluate(folder, source, wanted, play, plan.record, about, report)
-    records.conclude(folder, episodes, about | ({"training": weights.about(trained)} if trained else {}))
+    told = {"training": weights.about(trained) | _cost(plan, runs)} if trained else {}
+    access = (
+        {"privileged": "each setting's expert"} if isinstance(agent(method, plan.seed, trained), Privileged) else {}
+    )
+    records.conclude(folder, episodes, about | told | access)
     return folder
+
+
+def _cost(plan: Plan, runs: Path) -> dict[str, Any]:
+    """What a run's training took, as far as it is known: demonstrations, and seconds for all seeds of its group."""
+    course = plan.course(runs)
+    if not course:
+        return {}
+    count = getattr(course.learner, "demonstrations", lambda episodes: None)
+    seconds = course.seconds(plan.seed)
+    return {"demonstrations": count(len(splits.load(course.reaches, "train").cases)), "seconds": seconds}
 
 
 def evaluate(

@@ -186,6 +186,12 @@ def _begin(learner: Learner, track: Track, seeds: Sequence[int]) -> Trainer:
         return learner.trainer(track, seeds)
 
 
+def seconds(folder: Path) -> float | None:
+    """How long a training took so far, epochs and evaluations of its learning curve; None where it is not known."""
+    rows = _timings(folder / TIMING)
+    return round(sum(row["seconds"] for row in rows), 1) if rows else None
+
+
 def _timings(file: Path) -> list[dict[str, Any]]:
     """The rows of a file of timings; lines that were cut off are left out."""
     rows = []

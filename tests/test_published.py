@@ -48,7 +48,7 @@ def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
 @pytest.mark.parametrize("file", WEIGHTS, ids=name)
 def test_weights_that_ship_are_those_of_the_result(file: Path):
     result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
-    assert result["training"] == weights.about(file)
+    assert result["training"].items() >= weights.about(file).items()
     points = records.read_json(BOARD / "results" / name(file) / lessons.CURVE)["points"]
     assert result["training"]["best_epoch"] in [point["epoch"] for point in points]
 

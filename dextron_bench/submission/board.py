@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import filecmp
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from dextron_bench import publication, records, rollout, run, splits, tensors, traces, weights
+from dextron_bench import provenance, publication, records, rollout, run, splits, tensors, traces, weights
 from dextron_bench.learning import Heir, Learner
 from dextron_bench.submission import replaying, tables
 from dextron_bench.world import sources
@@ -48,63 +48,82 @@ def rows(board: Path, wanted: Sequence[str] = ()) -> list[Row]:
     return kept
 
 
-def check(
-    row: Row, some: int = 0, threads: int = 0, report: Report = lambda done, total: None
-) -> tuple[list[str], str]:
-    """Problems of a row, none where its episodes give what it says, and what was done; `some` rows of each split."""
+@dataclass(slots=True)
+class Finding:
+    """What checking a row found: problems, none where its episodes give what it says, and what was done.
+
+    `actions` are hashes of the actions on every split, where a baseline was run again on all rows.
+    """
+
+    done: str
+    problems: list[str] = field(default_factory=list)
+    actions: dict[str, list[str]] = field(default_factory=dict)
+
+
+def check(row: Row, some: int = 0, threads: int = 0, report: Report = lambda done, total: None) -> Finding:
+    """Checks a row of a board; of a baseline's splits `some` rows drawn at random, 0 for all."""
     if (row.folder / records.EPISODES).exists():
         return _replayed(row, threads, report)
     return _rerun(row, some, threads, report)
 
 
-def _replayed(row: Row, threads: int, report: Report) -> tuple[list[str], str]:
+def stamp(row: Row, finding: Finding) -> bool:
+    """Notes in a baseline's result that its agent was run again on all rows, and what it did; false if it was not."""
+    if finding.problems or finding.actions.keys() != row.result["splits"].keys():
+        return False
+    told = {name: split | {"actions": finding.actions[name]} for name, split in row.result["splits"].items()}
+    provenance.write_json(row.folder / records.RESULT, {**row.result, "splits": told, "tier": "re-run"})
+    return True
+
+
+def _replayed(row: Row, threads: int, report: Report) -> Finding:
     reaches = row.result["reaches"]
     wanted = [splits.load(reaches, name) for name in splits.evaluated(reaches)]
     table = tables.read(row.folder / records.EPISODES, wanted)
     if problems := list(tables.faults(table, wanted)):
-        return problems, ""
+        return Finding("", problems)
     found = replaying.again(sources.open_source(reaches), wanted, table, threads, report)
     if records.scores(found.rows) != row.result["splits"]:
-        return ["its result is not what its actions, played again, give", *found.differing[:5]], ""
-    return [], f"replayed, {found.exact} of {found.episodes} episodes equal bit for bit"
+        return Finding("", ["its result is not what its actions, played again, give", *found.differing[:5]])
+    return Finding(f"replayed, {found.exact} of {found.episodes} episodes equal bit for bit")
 
 
-def _rerun(row: Row, some: int, threads: int, report: Report) -> tuple[list[str], str]:
-    problems, done, total = [], 0, sum(len(told["scores"]) for told in row.result["splits"].values())
+def _rerun(row: Row, some: int, threads: int, report: Report) -> Finding:
+    found, done = Finding(""), 0
+    total = sum(len(told["scores"]) for told in row.result["splits"].values())
     try:
-        for name, told in row.result["splits"].items():
+        for name in row.result["splits"]:
             split = splits.load(row.result["reaches"], name)
-            if split.digest != told["digest"]:
-                problems.append(f"{name} is of another version of the split")
+            if split.digest != row.result["splits"][name]["digest"]:
+                found.problems.append(f"{name} is of another version of the split")
                 continue
-            numbers = _chosen(len(split.cases), some)
-            found = _played(row, split, numbers, told, threads)
-            if found and some:  # Some agents, such as dice, act otherwise beside others.
-                numbers = np.arange(len(split.cases))
-                found = _played(row, split, numbers, told, threads)
-            problems, done = problems + found, done + len(numbers)
+            done += _rerun_split(row, split, _chosen(len(split.cases), some), threads, found)
             report(done, total)
     except (NothingToVerify, weights.MissingWeights, rollout.AgentError) as error:
-        problems.append(str(error))
-    return problems, f"run again, {done} of {total} episodes, all equal"
+        found.problems.append(str(error))
+    found.done = f"run again, {done} of {total} episodes, all equal"
+    return found
 
 
-def _played(row: Row, split: splits.Split, numbers: np.ndarray, told: dict[str, Any], threads: int) -> list[str]:
-    """What of some rows of a split is not as the result tells."""
+def _rerun_split(row: Row, split: splits.Split, numbers: np.ndarray, threads: int, found: Finding) -> int:
+    """Runs a row's agent on rows of a split, notes what it finds; returns how many were played in the end."""
     source, cases = sources.open_source(split.reaches), [split.cases[number] for number in numbers]
-    found = rollout.rollout(_agent(row), source, cases, threads=threads)
-    return [
-        f"{split.name} row {numbers[place]}: {what}"
-        for place, episode in found
-        for what in _other(episode, told, int(numbers[place]))
-    ]
-
-
-def _other(episode: rollout.Episode, told: dict[str, Any], number: int) -> Iterator[str]:
-    if episode.score != told["scores"][number]:
-        yield f"says return {told['scores'][number]:g}; run again it is {episode.score:g}"
-    elif "actions" in told and traces.of_actions([episode.actions[:, 0]])[0] != told["actions"][number]:
-        yield "says other actions than those of the agent, run again"
+    played = dict(rollout.rollout(_agent(row), source, cases, threads=threads))
+    told, whole = row.result["splits"][split.name], len(numbers) == len(split.cases)
+    hashes = traces.of_actions(played[place].actions[:, 0] for place in range(len(numbers)))
+    problems = []
+    for place, number in enumerate(numbers):
+        if played[place].score != told["scores"][number]:
+            what = f"says return {told['scores'][number]:g}; run again it is {played[place].score:g}"
+            problems.append(f"{split.name} row {number}: {what}")
+        elif "actions" in told and hashes[place] != told["actions"][number]:
+            problems.append(f"{split.name} row {number}: says other actions than those of the agent, run again")
+    if problems and not whole:  # Some agents, such as dice, act otherwise beside others.
+        return _rerun_split(row, split, np.arange(len(split.cases)), threads, found)
+    found.problems += problems
+    if whole:
+        found.actions[split.name] = hashes
+    return len(numbers)
 
 
 def _chosen(count: int, some: int) -> np.ndarray:

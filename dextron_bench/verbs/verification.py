@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dextron_bench.submission.verification import Verdict
 
 DONE, DIFFERS = 0, 1
+SHOWN = 5  # Problems of a row that are told.
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Verify:
     """With --all: only so many rows of each split, drawn at random; 0 takes all."""
     method: tuple[str, ...] = ()
     """With --all: only these rows of the table."""
+    stamp: bool = False
+    """With --all: note in the results of baselines that were wholly run again that they were; then build the board."""
     rerun: bool = False
     """Also run the submission's agent again, isolated, from the files in its bundle."""
     board: Path = Path("leaderboard")
@@ -61,9 +64,13 @@ class Verify:
         sound = True
         for row in board.rows(self.board, self.method):
             with progress_bar(row.name, self.quiet) as progress:
-                problems, note = board.check(row, self.rows, self.threads, progress)
-            print(f"{row.name}: {note if not problems else 'NOT what its episodes give'}", *problems, sep="\n  ")
-            sound &= not problems
+                found = board.check(row, self.rows, self.threads, progress)
+            print(f"{row.name}: {found.done if not found.problems else 'NOT what its episodes give'}", flush=True)
+            for problem in found.problems[:SHOWN]:
+                print(f"  {problem}")
+            sound &= not found.problems
+            if self.stamp and board.stamp(row, found):
+                print("  its tier is now `re-run`")
         if problems := board.pages(self.board):
             print("tables and page: NOT what the results give", *problems, sep="\n  ")
         else:
