@@ -16,6 +16,7 @@ from typing import Annotated, Any, Protocol, Union
 import tyro
 
 from dextron_bench.verbs import (
+    check,
     compare,
     data,
     data_export,
@@ -25,6 +26,7 @@ from dextron_bench.verbs import (
     foretelling,
     leaderboard,
     mc,
+    new_agent,
     recordings,
     run,
     settings,
@@ -57,6 +59,8 @@ VERBS: dict[str, type[Verb] | Group] = {
             **{"verify": verification.Verify, "add": verification.Add},
         },
     ),
+    "new-agent": new_agent.NewAgent,
+    "check": check.Check,
     "submit": submit.Submit,
     "compare": compare.Compare,
     "view": view.View,

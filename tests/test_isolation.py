@@ -132,7 +132,7 @@ def test_nan_fails_one_episode_and_a_crash_those_that_were_played(made: Callable
         ("exit()", "did not start: it ended with code 0"),
         ("print('hi', flush=True)", "where a JSON object on one line was due"),
         ("print('{}', flush=True)", 'its first line must be {"protocol": 1}'),
-        ("print('x' * 10000, flush=True)", "its answer is longer than 4096 bytes"),
+        ("print('x' * 10000, flush=True)", "its answer is longer than 4176 bytes"),
     ],
 )
 def test_a_program_that_does_not_speak_the_protocol_is_named(tmp_path: Path, line: str, why: str):

@@ -109,7 +109,7 @@ class Isolated:
         begun, self._begun = sorted(set(self._begun)), []
         process = self._process or self._start(len(states))
         try:
-            line = process.ask(wire.question(begun, states), self._limits.answer, wire.longest(len(states)))
+            line = process.ask(wire.question(begun, states), self._limits.answer)
             return wire.actions(line, len(states))
         except (wire.BadAnswer, _Silent) as error:
             why = process.epitaph(error)
@@ -119,13 +119,12 @@ class Isolated:
     def _start(self, episodes: int) -> _Process:
         self.starts += 1
         try:
-            process = self._process = _Process(
-                self._how.words(self._scratch.name, self._limits.memory), self._scratch.name
-            )
+            words = self._how.words(self._scratch.name, self._limits.memory)
+            process = self._process = _Process(words, self._scratch.name, wire.longest(episodes))
         except (OSError, IndexError) as error:
             raise AgentError(f"the agent's process cannot be started: {error}") from error
         try:
-            wire.greeted(process.ask(wire.greeting(self._seed, episodes), self._limits.start, wire.HEAD))
+            wire.greeted(process.ask(wire.greeting(self._seed, episodes), self._limits.start))
         except (wire.BadAnswer, _Silent) as error:
             why = process.epitaph(error)
             self._stop()
@@ -146,7 +145,8 @@ class _Silent(RuntimeError):
 class _Process:
     """A process that is asked by lines; threads read and write, so that neither side can hang us."""
 
-    def __init__(self, words: Sequence[str], folder: str) -> None:
+    def __init__(self, words: Sequence[str], folder: str, room: int) -> None:
+        """Starts it in a folder; its answers may have `room` bytes."""
         environment = {name: os.environ[name] for name in KEPT if name in os.environ}
         environment |= {"HOME": folder, "TMPDIR": folder, "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `kill`)
@@ -161,24 +161,23 @@ class _Process:
         )
         self._questions: queue.Queue[bytes | None] = queue.Queue()
         self._answers: queue.Queue[bytes] = queue.Queue()
-        self._room = wire.HEAD
+        self._room = room
         assert self._popen.stdin
         assert self._popen.stdout
         threading.Thread(target=self._write, args=(self._popen.stdin,), daemon=True).start()
         threading.Thread(target=self._read, args=(self._popen.stdout,), daemon=True).start()
 
-    def ask(self, question: bytes, seconds: float, room: int) -> bytes:
+    def ask(self, question: bytes, seconds: float) -> bytes:
         """The line that answers; raises _Silent."""
         if not self._answers.empty() and (extra := self._answers.get()):
             raise _Silent(f"it wrote {len(extra)} bytes that nobody asked for")
-        self._room = room
         self._questions.put(question)
         try:
             line = self._answers.get(timeout=seconds)
         except queue.Empty:
             raise _Silent(f"it gave no answer within {seconds:g} s") from None
         if not line.endswith(b"\n"):
-            raise _Silent(f"its answer is longer than {room} bytes" if len(line) > room else "it ended")
+            raise _Silent(f"its answer is longer than {self._room} bytes" if len(line) > self._room else "it ended")
         return line
 
     def epitaph(self, error: Exception) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -22,6 +23,17 @@ FOLDER = "submissions"  # In the folder of runs.
 
 class BadSubmission(ValueError):
     """What cannot be submitted; the message says what would be right."""
+
+
+def read_settings(text: str) -> dict[str, Any]:
+    """Settings from JSON; raises BadSubmission."""
+    try:
+        found = json.loads(text)
+    except ValueError as error:
+        raise BadSubmission(f"--settings is no JSON ({error})") from error
+    if not isinstance(found, dict):
+        raise BadSubmission("settings are a JSON object, like '{\"near\": 0.05}'")
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +65,6 @@ class Entry:
     def __post_init__(self) -> None:
         if sorted(self.seeds) != list(range(len(self.seeds))):
             raise BadSubmission("seeds are 0, 1, 2 and so on, so that nobody chooses the best: --seed 0 1 2")
-        if not isinstance(self.settings, dict):
-            raise BadSubmission("settings are a JSON object, like '{\"near\": 0.05}'")
         if not methods.NAME.fullmatch(self.name) or len(self.name) > 64:
             raise BadSubmission(
                 f"the name {self.name!r} is not one: use up to 64 letters, digits and . _ + -, as in 'my-agent'"

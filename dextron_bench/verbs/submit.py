@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -91,8 +90,5 @@ class Submit:
 
         declared = contest.Declaration(**{each.name: getattr(self, each.name) for each in fields(contest.Declaration)})
         seeds = tuple(dict.fromkeys(self.seed))
-        try:
-            settings = json.loads(self.settings)
-        except ValueError as error:
-            raise contest.BadSubmission(f"--settings is no JSON ({error})") from error
+        settings = contest.read_settings(self.settings)
         return contest.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, declared)

@@ -1,0 +1,1 @@
+"""What `dextron-bench new-agent` copies: a small agent that works, and its test."""
