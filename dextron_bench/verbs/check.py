@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -55,5 +56,5 @@ class Check:
         if self.json:
             print_json([{"what": each.what, "verdict": each.verdict, "found": each.found} for each in found])
         else:
-            print(f"{len(bad)} to mend" if bad else f"ready: dextron-bench submit {self.agent} --name NAME")
+            print(f"{len(bad)} to mend" if bad else f"ready: dextron-bench submit {shlex.quote(self.agent)} --name NAME")
         return DIFFERS if bad else DONE
