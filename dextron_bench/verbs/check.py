@@ -56,5 +56,6 @@ class Check:
         if self.json:
             print_json([{"what": each.what, "verdict": each.verdict, "found": each.found} for each in found])
         else:
-            print(f"{len(bad)} to mend" if bad else f"ready: dextron-bench submit {shlex.quote(self.agent)} --name NAME")
+            ready = f"ready: dextron-bench submit {shlex.quote(self.agent)} --name NAME"
+            print(f"{len(bad)} to mend" if bad else ready)
         return DIFFERS if bad else DONE
