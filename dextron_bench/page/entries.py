@@ -78,7 +78,7 @@ def role(method: str) -> str | None:
 
 
 def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
-    training = [result.get("training") or {} for result in results]
+    training = [result.get("training") or _declared(result) for result in results]
     return Entry(
         row["method"],
         row["reaches"],
@@ -95,6 +95,14 @@ def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
     )
 
 
+def _declared(result: Result) -> dict[str, Any]:
+    """What the authors of a submission say of its training, as results of ours have it."""
+    told = result.get("declared") or {}
+    hours = told.get("hours")
+    known = {name: told.get(name) for name in ("frames", "demonstrations")}
+    return known | {"seconds": None if hours is None else 3600.0 * hours}
+
+
 def _learned_elsewhere(row: dict[Any, Any], training: Sequence[dict[str, Any]]) -> str | None:
     """Whose policy it is, for a method that takes another's."""
     for each in training:
@@ -109,6 +117,8 @@ def _largest(values: Iterable[Any]) -> Any:
 
 
 def _machine(result: Result) -> str | None:
+    if "declared" in result:
+        return str(result["declared"].get("hardware") or "") or None
     machine = result["provenance"].get("machine") or {}
     if not machine.get("cpu"):
         return None
@@ -118,4 +128,5 @@ def _machine(result: Result) -> str | None:
 def _privileged(method: str, results: Sequence[Result]) -> str | None:
     """What an agent was given beside the state, as was declared."""
     told = [str(result["privileged"]) for result in results if result.get("privileged")]
+    told += ["more than the state, as declared" for each in results if (each.get("declared") or {}).get("privileged")]
     return told[0] if told else ("each setting's expert" if method == CEILING else None)
