@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from dextron_bench.lessons import CURVE
 
 RESULTS = "results"  # In the leaderboard's folder: a folder of runs less their large files.
 BEGIN, END = "<!-- made by `dextron-bench leaderboard build`: -->", "<!-- end of what was made -->"
+MADE = ("tier", "frames", "demonstrations", "seconds", "hardware", "privileged")
 Curves = dict[int, pd.DataFrame]  # By seed; columns epoch, return, success.
 
 
@@ -47,7 +48,7 @@ def take(runs: Path, into: Path) -> list[Path]:
 
 
 def build(into: Path) -> list[Path]:
-    """Makes the table (CSV), its short form in the README, learning curves and the page from the folder's results.
+    """Makes the table (CSV, JSON), its short form in the README, learning curves and the page from the results.
 
     The page links to recordings in the folder beside. Returns the files; raises DamagedRun, BrokenRecording.
     """
@@ -56,12 +57,14 @@ def build(into: Path) -> list[Path]:
 
     results = list(records.results(into / RESULTS))
     rows = leaderboard.table(results)
-    made = [into / "table.csv", into / "README.md"]
-    provenance.write_whole(made[0], lambda part: rows.to_csv(part, index=False, float_format="%.6g"))
+    known = _whole(rows, results)
+    made = [into / "table.csv", into / "README.md", into / "table.json"]
+    provenance.write_whole(made[0], lambda part: known.to_csv(part, index=False, float_format="%.6g"))
+    provenance.write_whole(made[2], lambda part: known.to_json(part, orient="records", indent=1))
     curves: dict[str, dict[str, Curves]] = defaultdict(dict)
     for (method, reaches), found in learning_curves(into / RESULTS).items():
         curves[reaches][method] = found
-    _insert(made[1], "\n".join(_sections(rows, set(curves))))
+    _insert(made[1], "\n".join(_sections(known, set(curves))))
     for reaches, found in curves.items():
         made.append(into / _picture(reaches))
         figures.learning_curves(found, rows[rows["reaches"] == reaches], made[-1])
@@ -69,6 +72,14 @@ def build(into: Path) -> list[Path]:
     text = page.document(rows, results, curves, into.resolve().parent / FOLDER)
     provenance.write_whole(made[-1], lambda part: part.write_text(text, encoding="utf-8"))
     return made
+
+
+def _whole(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    """The leaderboard's rows with how far each was checked and what making it took, the columns MADE."""
+    from dextron_bench.page import entries
+
+    told = [each for each in entries.entries(rows, results) if each.tier != entries.QUOTED]
+    return rows.assign(**{name: [getattr(each, name) for each in told] for name in MADE})
 
 
 def learning_curves(runs: Path) -> dict[tuple[str, str], Curves]:
@@ -128,11 +139,12 @@ def _sections(rows: pd.DataFrame, drawn: set[str]) -> Iterator[str]:
         names = [name for name in splits.NAMES if name in set(group["split"])]
         ranked = group[group["split"] == "test"]["method"].tolist()
         yield f"\n## {reaches} reaches\nMean return of 20 with its 95 % interval, and successes [%].\n"
-        yield _line(["rank", "method", "seeds", *(f"`{name}`" for name in names)])
-        yield _line(["---"] * (3 + len(names)))
+        yield _line(["rank", "method", "seeds", "tier", *(f"`{name}`" for name in names)])
+        yield _line(["---"] * (4 + len(names)))
         for method in ranked:
             own = group[group["method"] == method].set_index("split")
-            cells = [f"{own['rank'].loc['test']:.0f}".replace("nan", ""), f"`{method}`", own["seeds"].iloc[0]]
+            rank, (seeds, tier) = own["rank"].loc["test"], own[["seeds", "tier"]].iloc[0]
+            cells = [f"{rank:.0f}".replace("nan", ""), f"`{method}`", seeds, tier]
             yield _line([*cells, *(_score(own, name) for name in names)])
         if reaches in drawn:
             yield f"\n![Learning curves on {reaches} reaches]({_picture(str(reaches))})"

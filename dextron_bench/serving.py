@@ -18,7 +18,7 @@ NAMES = LOOPBACK, "localhost"  # What a browser may call this machine; any other
 RECORDING = re.compile(rf"/{FOLDER}/([A-Za-z0-9][A-Za-z0-9._+-]*\.rrd)")
 LINK = re.compile(rf'href="\.\./{FOLDER}/([A-Za-z0-9._+%-]+\.rrd)"')
 VIEWER = "/viewer/"
-TABLE = "table.csv"
+TABLES = {"table.csv": "text/csv; charset=utf-8", "table.json": "application/json"}
 # Of the viewer: its own files and this server's recordings, so that it reaches nothing else.
 VIEWER_POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
@@ -57,8 +57,8 @@ class Site:
         """What lies at a path, for whom reaches this server as `host`; None where nothing does."""
         if path in ("/", f"/{FILE}"):
             return Answer("text/html; charset=utf-8", self._page(host).encode())
-        if path == f"/{TABLE}":
-            return _file(self.board, TABLE, "text/csv; charset=utf-8")
+        if path[1:] in TABLES:
+            return _file(self.board, path[1:], TABLES[path[1:]])
         if found := RECORDING.fullmatch(path):
             return _file(self.board.resolve().parent / FOLDER, found[1], "application/octet-stream")
         name = path.removeprefix(VIEWER) or FILE

@@ -51,7 +51,10 @@ def test_the_tables_are_those_of_the_results(here: Path):
     text = (here / "board/README.md").read_text()
     row = rows[(rows["method"] == "toy-0.1") & (rows["split"] == "test")].iloc[0]
     shown = f"{row['return']:.2f} [{row['return_low']:.2f}, {row['return_high']:.2f}], {100 * row['success']:.1f} %"
-    assert f"| {row['rank']:.0f} | `toy-0.1` | 2 | {shown} |" in text
+    assert f"| {row['rank']:.0f} | `toy-0.1` | 2 | self-reported | {shown} |" in text
+    again = json.loads((here / "board/table.json").read_text())
+    assert [each["tier"] for each in again] == written["tier"].tolist()
+    assert [each["frames"] for each in again if each["method"] == "nothing"] == [None, None]
     shares = [f"{25.0 * row[cause]:.1f}" for cause in CAUSES]  # Of two seeds' two episodes.
     assert f"| `toy-0.1` | {' | '.join(shares)} |" in text
     assert (here / "board/curves-synthetic.png").stat().st_size > 5000

@@ -40,7 +40,7 @@ def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
     shutil.copytree(BOARD, again)
     (tmp_path / "recordings").symlink_to(BOARD.parent / "recordings")
     assert cli.main(["leaderboard", "build", "--into", str(again)]) == 0
-    for made in ("README.md", "table.csv", "index.html"):
+    for made in ("README.md", "table.csv", "table.json", "index.html"):
         assert (again / made).read_text() == (BOARD / made).read_text()
     assert {file.name for file in again.glob("*.png")} == {file.name for file in BOARD.glob("*.png")}
 
