@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 from tiny import ROWS
 
 from dextron_bench import splits
-from dextron_bench.isolation import policies, wire
+from dextron_bench.isolation import policies, sandbox, wire
 from dextron_bench.isolation.agent import Isolated, Limits, launch
 from dextron_bench.rollout import AgentError, Case, Episode, rollout
 
@@ -98,7 +99,14 @@ def test_installed_methods_and_what_agents_print(made: Callable[[str], str]):
         ("return np.ones((len(states), 1), int)", "it returned int64"),
         ("import os; os._exit(7)", "it ended with code 7"),
         ("import os, signal; signal.raise_signal(9)", "it ended with signal SIGKILL"),
-        ("return np.ones((2, 10**10))", "Unable to allocate"),
+        ("return np.zeros((2, 10**9))[:, :1]", "Unable to allocate"),
+        ("open('big', 'wb').truncate(2**30)", "File too large"),
+        ("import os; os.rename(__file__, 'mine')", "agents may not change files outside the folder"),
+        ("open('a', 'w').close(); import os; os.rename('a', '/tmp/stolen')", "agents may not change files outside"),
+        ("import os; os.symlink('/etc', '/tmp/mine')", "agents may not change files outside the folder"),
+        ("import shutil, os; shutil.rmtree(os.path.dirname(__file__))", "agents may not change files outside"),
+        ("import os; os.listdir('/root')", "only Python's files and their own folder are theirs"),
+        ("import resource; resource.prlimit(1, resource.RLIMIT_CORE)", "agents may not search the process"),
         ("raise ValueError('lost')", "ValueError: lost"),
         ("while True: pass", "it gave no answer within 1 s"),
     ],
@@ -108,6 +116,42 @@ def test_what_fails_or_is_forbidden_fails_its_episodes_and_is_told(act: str, why
         assert episode.score == 0.0
         assert why in episode.failure
         assert episode.failure.endswith(" at step 0")
+
+
+@pytest.mark.skipif(not sandbox.is_here(), reason="bubblewrap is not here")
+@pytest.mark.parametrize(
+    "deed",
+    [
+        "open('{data}/splits.json').read(1)",
+        "open('{data}/experts-real.parquet', 'rb').read(1)",
+        "open('{beside}', 'w').write('x') and 0",
+        "os.listdir('{home}')",
+        "os.kill(int(open('/proc/self/stat').read().split()[3]), 0) or os.getppid() > 5",
+        "__import__('socket').create_connection(('127.0.0.1', {port}), 1)",
+        "__import__('shutil').rmtree('{package}') or 1",
+    ],
+)
+def test_the_sandbox_holds_what_the_hook_does_not(deed: str, made: Callable[[str], str], tmp_path: Path):
+    """An agent that takes the hook apart, then says by its action whether it came out."""
+    package = Path(sandbox.__file__).parents[1]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        beside = tmp_path / "beside"
+        told = {"data": package / "data", "package": package, "beside": beside, "home": Path(__file__).parent}
+        wanted = deed.format(**told, port=server.getsockname()[1])
+        act = f"""
+        from dextron_bench.isolation import guard
+        guard._Guard.__call__ = lambda *_: None
+        import os
+        try:
+            got = bool({wanted})
+        except Exception:
+            got = False
+        return np.full((len(states), 1), 1.0 if got else -1.0)"""
+        (episode,) = play(made(act.strip()), CASES[:1])
+        assert episode.failure == ""
+        assert (episode.actions == -1.0).all()
+        assert not beside.exists()
+    assert (package / "data" / "splits.json").exists()
 
 
 def test_an_agent_may_write_where_it_is_started(made: Callable[[str], str]):
@@ -158,7 +202,7 @@ def test_a_program_in_any_language_plays(tmp_path: Path):
 
 
 def test_a_program_that_is_not_there_is_named():
-    with pytest.raises(AgentError, match="No such file or directory: 'no-such-program'"):
+    with pytest.raises(AgentError, match=r"it ended with code 127: .*no-such-program"):
         play("exec:no-such-program")
 
 

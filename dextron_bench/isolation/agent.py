@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import queue
@@ -18,7 +19,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from dextron_bench.isolation import wire
+from dextron_bench.isolation import sandbox, wire
 from dextron_bench.rollout import AgentDown, AgentError
 
 KEPT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT", "VIRTUAL_ENV")  # Of the environment.
@@ -47,10 +48,9 @@ class Launch:
 
     def words(self, scratch: str, memory: int) -> list[str]:
         """The command, for a folder that the process may write to."""
-        if self.command:
-            return list(self.command)
-        told = {**asdict(self), "scratch": scratch, "memory": memory}
-        return [sys.executable, "-P", "-m", "dextron_bench.isolation.worker", json.dumps(told)]
+        told = {**asdict(self), "scratch": scratch}
+        worker = [sys.executable, "-P", "-m", "dextron_bench.isolation.worker", json.dumps(told)]
+        return sandbox.wrap(self.command or worker, scratch, self.own, memory)
 
 
 def launch(spec: str, settings: dict[str, Any] | None = None, weights: Path | None = None) -> Launch:
@@ -64,13 +64,17 @@ def launch(spec: str, settings: dict[str, Any] | None = None, weights: Path | No
     place, _, name = spec.rpartition(":")
     if spec.startswith("exec:"):
         words = shlex.split(spec.removeprefix("exec:"))
-        return Launch(command=tuple(str(Path(word).resolve()) if Path(word).exists() else word for word in words))
+        files = [str(Path(word).resolve()) for word in words if Path(word).is_file()]
+        command = tuple(str(Path(word).resolve()) if Path(word).is_file() else word for word in words)
+        return Launch(command=command, own=tuple(str(Path(file).parent) for file in files))
     if Path(spec).suffix in (".pt", ".onnx"):
         whole = str(Path(spec).resolve())
         return Launch(kind="policy", spec=whole, own=(whole,))
     if place.endswith(".py"):
         more["own"] += (str(Path(place).resolve().parent),)
         return Launch(kind="code", spec=f"{Path(place).resolve()}:{name}", **more)
+    if place and (found := importlib.util.find_spec(place.partition(".")[0])):
+        more["own"] += tuple(found.submodule_search_locations or [found.origin or ""])
     return Launch(kind="code" if place else "method", spec=spec, **more)
 
 
@@ -160,7 +164,7 @@ class _Process:
             start_new_session=True,
         )
         self._questions: queue.Queue[bytes | None] = queue.Queue()
-        self._answers: queue.Queue[bytes] = queue.Queue()
+        self._answers: queue.Queue[bytes] = queue.Queue(2)  # One that is due, and one that tells of too many.
         self._room = room
         assert self._popen.stdin
         assert self._popen.stdout
@@ -187,8 +191,7 @@ class _Process:
                 code = self._popen.wait(1.0)
             except subprocess.TimeoutExpired:
                 code = None
-            how = f"with signal {signal.Signals(-code).name}" if code is not None and code < 0 else f"with code {code}"
-            error = _Silent(f"it ended {how}")
+            error = _Silent(f"it ended with {_told(code)}")
         self._said.seek(max(0, self._said.seek(0, os.SEEK_END) - TAIL))
         lines = self._said.read().decode(errors="replace").split("\n")
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
@@ -197,12 +200,9 @@ class _Process:
     def peak(self) -> int:
         """The most memory [bytes] that the process has held, 0 where the system does not tell."""
         try:
-            for line in Path(f"/proc/{self._popen.pid}/status").read_text().splitlines():
-                if line.startswith("VmHWM"):
-                    return int(line.split()[1]) * 1024
+            return max(map(_peak, _family(self._popen.pid)))
         except (OSError, ValueError):
-            pass
-        return 0
+            return 0
 
     def kill(self) -> None:
         """Ends the process and what it started."""
@@ -230,3 +230,22 @@ class _Process:
                 if not line.endswith(b"\n"):
                     return
         self._answers.put(b"")
+
+
+def _told(code: int | None) -> str:
+    """How a process ended, from its exit code; a shell's for a signal is 128 and more."""
+    number = -code if code is not None and code < 0 else code - 128 if code is not None and code > 128 else 0
+    known = {each.value: each.name for each in signal.Signals}
+    return f"signal {known[number]}" if number in known else f"code {code}"
+
+
+def _family(process: int) -> list[int]:
+    """A process and all that came of it."""
+    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    return [process, *(each for child in children for each in _family(int(child)))]
+
+
+def _peak(process: int) -> int:
+    """The most memory [bytes] that a process has held."""
+    lines = Path(f"/proc/{process}/status").read_text().splitlines()
+    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")), 0)

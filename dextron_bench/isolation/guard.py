@@ -1,7 +1,7 @@
 """What an agent's process may not do: see the simulator or the splits, write outside its folder, reach others.
 
-A hook on Python's own audit events stops an agent that tries in Python, by accident or design, and says what it was. It
-stops no native code that means harm: docs/agents.md says what remains, and what covers it.
+A hook on Python's own audit events stops what an agent tries and says what it was. It is no boundary against code that
+means harm, which can take the hook apart: that is what `sandbox` is for (docs/leaderboard.md).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.isolation import sandbox
 from dextron_bench.world import model
 
 PUBLIC = {  # Modules of the benchmark that agents may import, with what those need.
@@ -20,13 +21,13 @@ PUBLIC = {  # Modules of the benchmark that agents may import, with what those n
     *(f"dextron_bench.world.{name}" for name in ("model", "task", "rotation", "reach")),
 }
 SIMULATORS = ("mujoco", "dm_control")
-SECRET = ("splits", "experts", "database")  # What names in the package's data begin with that tell of settings.
-REACHING = ("socket.connect", "socket.bind", "socket.sendto", "socket.getaddrinfo", "socket.gethostbyname")
-STARTING = ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "os.forkpty")
-DIGGING = ("gc.get_objects", "gc.get_referrers", "gc.get_referents", "sys._current_frames")
-CHANGING = (
-    *("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate"),
-    *("os.chmod", "os.chown", "os.utime", "os.setxattr", "sqlite3.connect"),
+NETWORK = ("socket.connect", "socket.bind", "socket.send", "socket.getaddrinfo", "socket.gethostby")
+STARTING = ("subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "os.kill", "pty.")
+DIGGING = ("gc.get_", "sys._current_frames", "resource.")
+LISTING = ("os.listdir", "os.scandir")
+CHANGING = (  # Their arguments are paths, numbers, and last where there are any, folders by descriptor.
+    *("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "os.mkfifo"),
+    *("os.chmod", "os.chown", "os.utime", "os.setxattr", "sqlite3.connect", "shutil.rmtree", "shutil.move"),
 )
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 DEVICES = ("/dev/null", "/dev/urandom", "/dev/random", "/proc/cpuinfo", "/proc/meminfo", "/proc/self", "/sys/devices")
@@ -45,8 +46,8 @@ def close(own: Sequence[Path], scratch: Path) -> None:
     package = Path(__file__).resolve().parents[1]
     places = {sys.prefix, sys.base_prefix, sys.exec_prefix, *(entry for entry in sys.path if "-packages" in entry)}
     allowed = [*places, *DEVICES, "/usr", "/lib", "/lib64", "/etc", package, package.parent / "baselines", *own]
-    guard = _Guard([os.path.realpath(place) for place in allowed], os.path.realpath(scratch), str(package / "data"))
-    sys.addaudithook(guard)
+    hidden = [str(file) for file in sandbox.secrets()]
+    sys.addaudithook(_Guard([os.path.realpath(place) for place in allowed], os.path.realpath(scratch), hidden))
 
 
 def hide() -> None:
@@ -71,8 +72,8 @@ def _is_hidden(name: str) -> bool:
 class _Guard:
     """The hook; raises NotForAgents."""
 
-    def __init__(self, allowed: Sequence[str], scratch: str, data: str) -> None:
-        self._allowed, self._scratch, self._data = tuple(allowed), scratch, data
+    def __init__(self, allowed: Sequence[str], scratch: str, secrets: Sequence[str]) -> None:
+        self._allowed, self._scratch, self._secrets = tuple(allowed), scratch, frozenset(secrets)
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
         if event == "import" and _is_hidden(arguments[0]):
@@ -80,29 +81,39 @@ class _Guard:
         if event == "open":
             self._check_open(*arguments)
         elif event in CHANGING:
-            self._check_change(arguments[0], event)
-        elif event in REACHING:
+            self._check_change(arguments, event)
+        elif event in LISTING and _is_path(arguments[0]):
+            self._check_read(os.path.realpath(os.fsdecode(arguments[0])))
+        elif event.startswith(NETWORK):
             raise NotForAgents(f"use the network ({event})")
-        elif event in STARTING or event.startswith(("os.spawn", "os.exec", "os.kill", "pty.")):
+        elif event.startswith(STARTING):
             raise NotForAgents(f"start or signal processes ({event})")
-        elif event in DIGGING:
+        elif event.startswith(DIGGING):
             raise NotForAgents(f"search the process they run in ({event})")
 
     def _check_open(self, path: Any, mode: str | None, flags: int) -> None:
-        if not isinstance(path, str | bytes | os.PathLike):
+        if not _is_path(path):
             return  # A file descriptor.
         place = os.path.realpath(os.fsdecode(path))
         if flags & WRITING and place != "/dev/null" and not _within(place, self._scratch):
             raise NotForAgents(f"write {place}: only the folder they are started in is theirs")
-        if _within(place, self._data) and os.path.basename(place).startswith(SECRET):
+        self._check_read(place)
+
+    def _check_read(self, place: str) -> None:
+        if place in self._secrets:
             raise NotForAgents(f"read {place}: settings and experts are not for agents")
         if not any(_within(place, each) for each in (*self._allowed, self._scratch)):
             raise NotForAgents(f"read {place}: only Python's files and their own folder are theirs")
 
-    def _check_change(self, path: Any, event: str) -> None:
-        place = os.path.realpath(os.fsdecode(path)) if isinstance(path, str | bytes | os.PathLike) else ""
-        if not _within(place, self._scratch):
-            raise NotForAgents(f"change files outside the folder they are started in ({event} {place})")
+    def _check_change(self, arguments: tuple[Any, ...], event: str) -> None:
+        places = [os.path.realpath(os.fsdecode(path)) for path in arguments if _is_path(path)]
+        beside = [each for each in arguments[-1:] if type(each) is int and each >= 0 and event != "os.truncate"]
+        if beside or not all(_within(place, self._scratch) for place in places):
+            raise NotForAgents(f"change files outside the folder they are started in ({event} {' '.join(places)})")
+
+
+def _is_path(value: Any) -> bool:
+    return isinstance(value, str | bytes | os.PathLike)
 
 
 def _within(place: str, folder: str) -> bool:

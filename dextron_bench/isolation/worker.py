@@ -5,7 +5,6 @@ Installed methods are loaded before the guard closes, since their code is the us
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import sys
@@ -26,9 +25,8 @@ def main(told: dict[str, Any]) -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # What an agent prints is no answer.
     questions = sys.stdin.buffer
-    _limit(told["memory"])
     installed = _installed(told["spec"]) if told["kind"] == "method" else None
-    guard.close([Path(place) for place in (*told["own"], *_home(told))], Path(told["scratch"]))
+    guard.close([Path(place) for place in told["own"]], Path(told["scratch"]))
     seed = json.loads(questions.readline())["seed"]
     agent = _made(told, installed, seed)
     answers.write(json.dumps({"protocol": wire.PROTOCOL, "name": told["spec"]}).encode() + b"\n")
@@ -72,24 +70,6 @@ def _made(told: dict[str, Any], installed: Any, seed: int) -> Any:
         taught = getattr(method, "teacher", method)
         return taught.policy(tensors.read(Path(told["weights"])))
     return method.agent(seed)
-
-
-def _home(told: dict[str, Any]) -> list[str]:
-    """Where the code of an agent given as `module:Class` lies."""
-    if told["kind"] != "code" or told["spec"].rpartition(":")[0].endswith(".py"):
-        return []
-    found = importlib.util.find_spec(told["spec"].partition(".")[0].partition(":")[0])
-    return [*(found.submodule_search_locations or [found.origin or ""])] if found else []
-
-
-def _limit(memory: int) -> None:
-    """Bounds what the process may allocate [bytes], where the system can."""
-    try:
-        import resource
-    except ImportError:
-        return
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 if __name__ == "__main__":
