@@ -19,7 +19,7 @@ import tiny
 
 from dextron_bench import cli, recording, records, splits
 from dextron_bench.isolation.agent import Limits
-from dextron_bench.submission import bundle, contest, verification
+from dextron_bench.submission import bundle, contest, merging, verification
 from dextron_bench.submission.verification import Verdict
 from dextron_bench.world import sources
 
@@ -114,7 +114,8 @@ def forged(made: Path, tmp_path: Path) -> Forgery:
 def test_a_sound_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forged: Forgery):
     """Of four episodes a seed one knocks the bottle over."""
     verdict = forged.checked(rerun=True)
-    assert verdict.problems == verdict.notes == []
+    assert verdict.problems == []
+    assert verdict.notes[-1] == "all seeds have the same episodes: they count as one, not as several trainings"
     assert (verdict.tier, verdict.episodes, verdict.exact) == ("re-run", 8, 8)
     assert verdict.results[0]["splits"]["test"]["scores"] == [20.0, 20.0, 0.0]
 
@@ -282,6 +283,28 @@ def test_an_agent_that_did_not_play_these_episodes_is_caught(forged: Forgery):
     assert "the agent, run again, acts otherwise" in problems[0]
 
 
+PARROT = """
+import glob
+
+
+class Near:
+    name = "near"
+
+    def __init__(self, near=0.06):
+        pass
+
+    def agent(self, seed):
+        raise SystemExit(70 + len(glob.glob(__file__.rpartition("/agent/")[0] + "/seed*")))
+"""
+
+
+def test_an_agent_that_is_run_again_finds_nothing_to_repeat(forged: Forgery):
+    """It ends with 70 and as many folders of episodes as it finds, or is stopped where it looks for them."""
+    (forged.folder / "agent" / "near.py").write_text(PARROT)
+    problems = forged.checked(rerun=True).problems
+    assert "it ended with code 70" in problems[0] or "agents may not" in problems[0]
+
+
 def test_an_agent_that_cannot_be_run_again_is_told(forged: Forgery):
     (forged.folder / "agent" / "near.py").unlink()
     assert "the bundle lacks the agent's file near.py" in forged.checked(rerun=True).problems[0]
@@ -362,6 +385,35 @@ def test_paths_and_kinds_that_no_bundle_has_are_refused(name: str, unsafe: Unsaf
     assert f"a bundle has no file {name!r}" in unsafe.add(name, b"x").refused(tmp_path / "into")
 
 
+def test_ways_of_packing_that_hide_sizes_are_refused(unsafe: Unsafe, tmp_path: Path):
+    unsafe.add("agent/zeros.pt", bytes(2**20))
+    unsafe.members[-1][0].compress_type = zipfile.ZIP_BZIP2
+    assert "agent/zeros.pt is packed in a way" in unsafe.refused(tmp_path / "into")
+
+
+@pytest.mark.parametrize("name", ["exp", "Exp", "rlil-0.3", "RLIL-0.1-mine", "exp\n", "first", "FIRST"])
+def test_names_that_are_or_look_like_anothers_are_refused(name: str, tmp_path: Path):
+    (tmp_path / "results" / "first" / "real" / "seed0").mkdir(parents=True)
+    with pytest.raises(contest.BadSubmission):
+        merging.check_name(name, "synthetic", tmp_path, replace=True)
+    merging.check_name("first-of-mine", "synthetic", tmp_path, replace=False)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [{"machine": "x"}, {"git": ["a"]}, {"machine": {"system": "Linux", "cpu": "\ud800", "cores": 1}}, {"more": 1}],
+)
+def test_a_provenance_from_which_no_page_could_be_made_is_refused(told: dict[str, Any], forged: Forgery):
+    forged.json("seed0/provenance.json", lambda whole: whole.update(told))
+    forged.json("seed0/result.json", lambda result: result["provenance"].update(told))
+    assert "in the result is not" in forged.checked().problems[0] or "text" in forged.checked().problems[0]
+
+
+def test_a_text_that_would_fill_the_memory_is_refused(forged: Forgery):
+    forged.table(row(2, failure="x" * 5000))
+    assert "has texts of more than 1000 letters in column 'failure'" in forged.checked().problems[0]
+
+
 def test_links_twins_and_strays_are_refused(made: Path, unsafe: Unsafe, tmp_path: Path):
     link = zipfile.ZipInfo("agent/link.py")
     link.external_attr = (stat.S_IFLNK | 0o777) << 16
@@ -374,7 +426,7 @@ def test_links_twins_and_strays_are_refused(made: Path, unsafe: Unsafe, tmp_path
 
 def test_a_bomb_is_refused_before_it_is_unpacked(unsafe: Unsafe, tmp_path: Path):
     bomb = unsafe.add("agent/zeros.pt", bytes(bundle.LARGEST + 1))
-    assert "agent/zeros.pt would unpack to more than 256 MiB" in bomb.refused(tmp_path / "into")
+    assert "agent/zeros.pt would unpack to too much (256 MiB)" in bomb.refused(tmp_path / "into")
     assert bomb.file.stat().st_size < 2**21
 
 
@@ -445,6 +497,11 @@ def test_a_board_of_baselines_is_run_again(made: Path, tmp_path: Path, capsys: p
     told = capsys.readouterr().out
     assert "exp, synthetic reaches, seed 0: run again, 2 of 4 episodes, all equal" in told
     assert "random, synthetic reaches, seed 0: run again" in told
+    copied = board / "results/best/synthetic/seed0"
+    shutil.copytree(board / "results/exp/synthetic/seed0", copied)
+    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
+    assert "lies in best/synthetic/seed0, but was made by exp" in capsys.readouterr().out
+    shutil.rmtree(copied.parents[1])
     file = board / "results/exp/synthetic/seed0/result.json"
     file.write_text(file.read_text().replace("20.0", "19.0", 1))
     assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1

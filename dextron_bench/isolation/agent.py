@@ -57,7 +57,7 @@ def launch(spec: str, settings: dict[str, Any] | None = None, weights: Path | No
     """How to start the agent that a user names.
 
     `exec:COMMAND` is a program that speaks the protocol, `FILE.pt` and `FILE.onnx` are policies, `file.py:Class` and
-    `module:Class` are code, all else is an installed method. `weights` are those of a method that learns.
+    `module:Class` are code, all else is an installed method. `weights` are of a method that learns. Raises AgentError.
     """
     file = str(weights.resolve()) if weights else ""
     more = {"settings": settings or {}, "weights": file, "own": (file,) if file else ()}
@@ -69,9 +69,15 @@ def launch(spec: str, settings: dict[str, Any] | None = None, weights: Path | No
         return Launch(command=command, own=tuple(str(Path(file).parent) for file in files))
     if Path(spec).suffix in (".pt", ".onnx"):
         whole = str(Path(spec).resolve())
+        if not Path(whole).is_file():
+            raise AgentError(f"there is no file {spec}")
         return Launch(kind="policy", spec=whole, own=(whole,))
+    if spec.endswith(".py"):
+        raise AgentError(f"{spec} is a file: name its class too, as in {spec}:MyAgent")
     if place.endswith(".py"):
-        more["own"] += (str(Path(place).resolve().parent),)
+        if not Path(place).is_file():
+            raise AgentError(f"there is no file {place}")
+        more["own"] += (str(Path(place).resolve()),)
         return Launch(kind="code", spec=f"{Path(place).resolve()}:{name}", **more)
     if place and (found := importlib.util.find_spec(place.partition(".")[0])):
         more["own"] += tuple(found.submodule_search_locations or [found.origin or ""])

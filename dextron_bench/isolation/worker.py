@@ -63,8 +63,8 @@ def _made(told: dict[str, Any], installed: Any, seed: int) -> Any:
     if told["kind"] == "policy":
         return policies.load(Path(told["spec"]))
     found = installed or entrants.find(told["spec"])
-    if found is None:
-        raise LookupError(f"{told['spec']!r}: there is no such class")
+    if not isinstance(found, type) or not hasattr(found, "name"):
+        raise LookupError(f"{told['spec']!r} is no class with a `name`")
     method = found(**told["settings"])
     if told["weights"]:
         taught = getattr(method, "teacher", method)

@@ -86,12 +86,20 @@ def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
         tier(results),
         row,
         role(row["method"]),
-        _learned_elsewhere(row, training),
+        _learned_elsewhere(row, training) or _authors(results),
         _largest(each.get("frames") for each in training),
         _largest(each.get("demonstrations") for each in training),
         _largest(each.get("seconds") for each in training),
         " / ".join(dict.fromkeys(filter(None, map(_machine, results)))) or None,
         _privileged(row["method"], results),
+    )
+
+
+def _authors(results: Sequence[Result]) -> str | None:
+    """Whose a submission is, with what they say of it."""
+    told = [each["declared"] for each in results if each.get("declared")]
+    return (
+        " · ".join(filter(None, (told[0].get(name) for name in ("authors", "notes", "url")))) or None if told else None
     )
 
 

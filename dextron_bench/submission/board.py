@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench import provenance, publication, records, rollout, run, splits, tensors, traces, weights
+from dextron_bench import methods, provenance, publication, records, rollout, run, splits, tensors, traces, weights
 from dextron_bench.learning import Heir, Learner
-from dextron_bench.submission import replaying, tables
+from dextron_bench.submission import bundle, replaying, tables
 from dextron_bench.world import sources
 
 Report = Callable[[int, int], None]  # Told (episodes done, all).
@@ -83,6 +83,10 @@ def _replayed(row: Row, threads: int, report: Report) -> Finding:
     if problems := list(tables.faults(table, wanted)):
         return Finding("", problems)
     found = replaying.again(sources.open_source(reaches), wanted, table, threads, report)
+    manifest = records.read_json(row.folder.parent / bundle.MANIFEST)
+    told = [row.result.get(name) for name in ("method", "reaches", "declared")]
+    if told != [manifest.get(name) for name in ("name", "reaches", "declared")]:
+        return Finding("", ["its name, reaches or declarations are not those that its manifest has"])
     if records.scores(found.rows) != row.result["splits"]:
         return Finding("", ["its result is not what its actions, played again, give", *found.differing[:5]])
     return Finding(f"replayed, {found.exact} of {found.episodes} episodes equal bit for bit")
@@ -92,6 +96,8 @@ def _rerun(row: Row, some: int, threads: int, report: Report) -> Finding:
     found, done = Finding(""), 0
     total = sum(len(told["scores"]) for told in row.result["splits"].values())
     try:
+        if lacking := set(splits.evaluated(row.result["reaches"])) - row.result["splits"].keys():
+            found.problems.append(f"lacks {', '.join(sorted(lacking))}")
         for name in row.result["splits"]:
             split = splits.load(row.result["reaches"], name)
             if split.digest != row.result["splits"][name]["digest"]:
@@ -136,10 +142,13 @@ def _chosen(count: int, some: int) -> np.ndarray:
 def _agent(row: Row) -> rollout.Agent:
     """The agent of a baseline's row: from the code and the weights that ship; raises NothingToVerify and others."""
     told, seed = row.result.get("maker", {}), row.result["seed"]
-    if "method" not in told or told["code"]["sha256"]:
+    if told.get("method") not in methods.known():
         raise NothingToVerify("has neither its episodes nor a method that ships")
     plan = run.Plan(told["method"], row.result["reaches"], (), seed, settings=told["settings"])
     method = plan.make()
+    place, claimed = row.folder.parts[-3:], (row.result["method"], row.result["reaches"], f"seed{seed}")
+    if place != claimed or claimed[:2] != (plan.label, plan.home):
+        raise NothingToVerify(f"lies in {'/'.join(place)}, but was made by {plan.label} on {plan.home} reaches")
     if isinstance(method, Heir | Learner):
         plan = run.shipped(plan, [seed])[0]
         assert plan.weights

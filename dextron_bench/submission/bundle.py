@@ -29,6 +29,7 @@ MEMBER = re.compile(
 )
 MEMBERS = 20_000
 LARGEST = 256 * 2**20  # [bytes] of one file, unpacked.
+MANIFESTS = 4 * 2**20  # [bytes] of the manifest.
 TOTAL = 8 * 2**30  # [bytes] of all files, unpacked.
 CHUNK = 2**20
 MOMENT = (1980, 1, 1, 0, 0, 0)  # What every member is dated, so that equal contents make equal bundles.
@@ -82,7 +83,11 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
 
 
 def check(value: Any, schema: str, file: Path) -> None:
-    """Raises BadBundle where a JSON value is not as one of the shipped schemas says."""
+    """Raises BadBundle where a JSON value is not as a shipped schema says, or holds text that cannot be written."""
+    try:
+        json.dumps(value, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        raise BadBundle(f"{file}: the {schema} has text that is none") from error
     error = best_match(_schema(schema).iter_errors(value))
     if error:
         where = "/".join(map(str, error.absolute_path)) or "it"
@@ -114,8 +119,10 @@ def _members(file: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]
             raise BadBundle(f"{file} holds {info.filename} twice")
         if stat.S_ISLNK(info.external_attr >> 16) or info.flag_bits & 1:
             raise BadBundle(f"{file}: {info.filename} is a link or encrypted")
-        if info.file_size > LARGEST:
-            raise BadBundle(f"{file}: {info.filename} would unpack to more than {LARGEST / 2**20:g} MiB")
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise BadBundle(f"{file}: {info.filename} is packed in a way of which sizes cannot be held to")
+        if info.file_size > (MANIFESTS if info.filename == MANIFEST else LARGEST):
+            raise BadBundle(f"{file}: {info.filename} would unpack to too much ({info.file_size / 2**20:.0f} MiB)")
         found[info.filename] = info
     return found
 
@@ -145,8 +152,8 @@ def _content(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo | None)
     if info is None:
         raise BadBundle(f"{file} is no bundle: it lacks {MANIFEST}; `dextron-bench submit` makes one")
     with archive.open(info) as content:
-        found = content.read(LARGEST + 1)
-    if len(found) > LARGEST:
+        found = content.read(MANIFESTS + 1)
+    if len(found) > MANIFESTS:
         raise BadBundle(f"{file}: {info.filename} unpacks to more than it says")
     return found
 

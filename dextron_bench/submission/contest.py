@@ -63,6 +63,8 @@ class Entry:
     declared: Declaration = field(default_factory=Declaration)
 
     def __post_init__(self) -> None:
+        if self.name.casefold().split("-")[0] in methods.known():
+            raise BadSubmission(f"the name {self.name!r} begins like that of an installed method; choose another")
         if sorted(self.seeds) != list(range(len(self.seeds))):
             raise BadSubmission("seeds are 0, 1, 2 and so on, so that nobody chooses the best: --seed 0 1 2")
         if not methods.NAME.fullmatch(self.name) or len(self.name) > 64:
@@ -112,6 +114,7 @@ def compete(
     Raises AgentError where the agent cannot be started, RunMismatch where the folder is another entry's, MissingData.
     """
     folder, source = entry.folder(runs), sources.open_source(entry.reaches)
+    bundle.check({"format": bundle.FORMAT, **entry.told(), "files": {}}, "bundle", folder)
     wanted = [splits.load(entry.reaches, name) for name in splits.evaluated(entry.reaches)]
     for seed in entry.seeds:
         place = folder / f"seed{seed}"

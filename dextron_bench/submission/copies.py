@@ -27,6 +27,12 @@ def found(results: Mapping[int, dict[str, Any]], name: str, board: Path) -> Iter
                     )
 
 
+def all_equal(results: Mapping[int, dict[str, Any]]) -> bool:
+    """Whether all seeds acted the same in every episode, as a rule without chance does."""
+    told = [[split.get("actions") for split in result["splits"].values()] for result in results.values()]
+    return all(each == told[0] for each in told)
+
+
 def _equal(own: dict[str, Any], others: dict[str, Any]) -> dict[str, tuple[int, int]]:
     """Rows of each split with equal actions, and all rows."""
     counts = {}

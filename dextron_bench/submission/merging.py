@@ -4,36 +4,50 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from dextron_bench import methods, provenance, records
+from dextron_bench import methods, provenance, publication, records
 from dextron_bench.submission import bundle
 from dextron_bench.submission.contest import BadSubmission
 from dextron_bench.submission.verification import Verdict
 
-RESULTS = "results"
-
 
 def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:
     """Raises BadSubmission where a row of that name is not the submission's to write."""
-    place = board / RESULTS / name
-    baseline = place.exists() and not list(place.glob(f"*/{bundle.MANIFEST}"))
-    if name in methods.known() or baseline:
-        raise BadSubmission(f"{name!r} is a baseline's name; choose another with `dextron-bench submit --name`")
-    if (place / reaches).exists() and not replace:
+    if not methods.NAME.fullmatch(name):
+        raise BadSubmission(f"{name!r} is no name: use letters, digits and . _ + -, as in 'my-agent'")
+    results = board / publication.RESULTS
+    rows = {place.name.casefold(): place for place in results.iterdir()} if results.exists() else {}
+    place = rows.get(name.casefold())
+    ours = place is not None and (place.name != name or not list(place.glob(f"*/{bundle.MANIFEST}")))
+    if ours or name.casefold().split("-")[0] in methods.known():
+        raise BadSubmission(f"{name!r} is or begins like the name of a row that is not yours; submit it under another")
+    if place and (place / reaches).exists() and not replace:
         raise BadSubmission(f"{name!r} on {reaches} reaches is on the board; --replace puts this one in its place")
 
 
-def merge(verdict: Verdict, folder: Path, board: Path) -> list[Path]:
-    """Puts a sound submission, unpacked in a folder, on the board; returns the folders of its results."""
+def merge(verdict: Verdict, board: Path) -> list[Path]:
+    """Puts a sound submission on the board and makes its tables and page again; returns the files that were made.
+
+    All is made beside the board first, so that a submission from which no page can be made leaves it as it was.
+    """
+    with TemporaryDirectory() as folder:
+        trial = Path(folder) / board.name
+        if board.exists():
+            shutil.copytree(board, trial)
+        _put(verdict, trial)
+        publication.build(trial)
+    _put(verdict, board)
+    return publication.build(board)
+
+
+def _put(verdict: Verdict, board: Path) -> None:
     manifest = verdict.manifest
-    place = board / RESULTS / manifest["name"] / manifest["reaches"]
+    place = board / publication.RESULTS / manifest["name"] / manifest["reaches"]
     shutil.rmtree(place, ignore_errors=True)
-    made = []
     for seed, result in verdict.results.items():
         own = place / f"seed{seed}"
         own.mkdir(parents=True)
-        shutil.copyfile(folder / f"seed{seed}" / records.EPISODES, own / records.EPISODES)
+        records.store(own, verdict.tables[seed])
         provenance.write_json(own / records.RESULT, {**result, "tier": verdict.tier})
-        made.append(own)
     provenance.write_json(place / bundle.MANIFEST, manifest)  # Last: with it the row is whole.
-    return made

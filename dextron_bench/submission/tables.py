@@ -18,6 +18,7 @@ SETTING = ("reach", "offset_x", "offset_y", "duration_noise")
 FLAGS, NUMBERS = ("success", "terminated", "truncated"), (*SETTING[1:], "score", "closing_lag")
 TEXTS, COUNTS = ("split", "digest", "reach", "failure", "cause", "trace"), ("row", "length")
 LISTS = {"actions": task.STEP_LIMIT, "final": model.STATE}  # And the most numbers of each.
+LONGEST = 1000  # Letters of a text.
 COLUMNS = {*FLAGS, *NUMBERS, *TEXTS, *COUNTS, *LISTS}
 
 
@@ -25,12 +26,12 @@ def read(file: Path, wanted: Sequence[splits.Split]) -> pd.DataFrame:
     """The table in a file, of a known form and no larger than one of the splits can be; raises BadBundle, OSError."""
     rows = sum(len(split.cases) for split in wanted)
     try:
-        found = pq.ParquetFile(file)
+        found = pq.ParquetFile(file, read_dictionary=list(TEXTS))
         if found.metadata.num_rows != rows:
             raise BadBundle(f"{file.name} has {found.metadata.num_rows} episodes where the splits have {rows}")
         _check_form(file, found.schema_arrow)
         _check_size(file, found.metadata, rows)
-        return found.read(columns=sorted(COLUMNS)).to_pandas()
+        return _bounded(file, found)
     except (pa.ArrowException, OverflowError) as error:
         raise BadBundle(f"{file.name} is no table that can be read ({error})") from error
 
@@ -61,6 +62,19 @@ def _faults(rows: pd.DataFrame, split: splits.Split) -> Iterator[str]:
             yield f"row {row.row} has actions that are not {row.length} numbers in [-1, 1]"
 
 
+def _bounded(file: Path, found: pq.ParquetFile) -> pd.DataFrame:
+    """The table; texts are looked at while each is held once, however many rows repeat it."""
+    for name in TEXTS:
+        for chunk in found.read(columns=[name]).column(name).chunks:
+            if max((len(text or "") for text in chunk.dictionary.to_pylist()), default=0) > LONGEST:
+                raise BadBundle(f"{file.name} has texts of more than {LONGEST} letters in column {name!r}")
+    table = found.read(columns=sorted(COLUMNS))
+    for name in TEXTS:
+        plain = table.column(name).cast(pa.string())
+        table = table.set_column(table.schema.get_field_index(name), name, plain)
+    return table.to_pandas()
+
+
 def _check_form(file: Path, schema: pa.Schema) -> None:
     if lacking := sorted(COLUMNS ^ set(schema.names)):
         raise BadBundle(f"{file.name} should have the columns of this version; it differs in {lacking[0]!r}")
@@ -68,7 +82,7 @@ def _check_form(file: Path, schema: pa.Schema) -> None:
         **dict.fromkeys(FLAGS, pa.types.is_boolean),
         **dict.fromkeys(NUMBERS, pa.types.is_float64),
         **dict.fromkeys(COUNTS, pa.types.is_int64),
-        **dict.fromkeys(TEXTS, lambda kind: pa.types.is_string(kind) or pa.types.is_large_string(kind)),
+        **dict.fromkeys(TEXTS, pa.types.is_dictionary),
         **dict.fromkeys(LISTS, lambda kind: pa.types.is_list(kind) and pa.types.is_float64(kind.value_type)),
     }
     for name, test in tests.items():

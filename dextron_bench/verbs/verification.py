@@ -99,17 +99,15 @@ class Add:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench import publication
         from dextron_bench.submission import merging
 
         with unpacked(self.bundle) as opened:
-            folder, manifest = opened
+            manifest = opened[1]
             merging.check_name(manifest["name"], manifest["reaches"], self.board, self.replace)
             verdict = _verified(opened, self.board, self.rerun, self.threads, self.quiet)
             code = told(verdict)
             if verdict.sound:
-                print(*merging.merge(verdict, folder, self.board), sep="\n")
-                print(*publication.build(self.board), sep="\n")
+                print(*merging.merge(verdict, self.board), sep="\n")
         return code
 
 
