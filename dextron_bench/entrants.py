@@ -24,8 +24,8 @@ class UnknownMethod(KeyError):
 def find(spec: str) -> Any:
     """What `module:Class` or `file.py:Class` names, or None; raises UnknownMethod where it cannot be imported."""
     place, _, name = spec.rpartition(":")
-    imports = _from_file if place.endswith(".py") else importlib.import_module
-    return getattr(loaded(spec, lambda: imports(place)), name, None)
+    module = loaded(spec, lambda: _from_file(spec, place) if place.endswith(".py") else importlib.import_module(place))
+    return getattr(module, name, None)
 
 
 def origin(found: type) -> dict[str, str | None]:
@@ -46,11 +46,11 @@ def loaded(spec: str, load: Callable[[], Any]) -> Any:
         raise UnknownMethod(f"method {spec!r} cannot be imported: {type(error).__name__}: {error}") from error
 
 
-def _from_file(place: str) -> ModuleType:
+def _from_file(spec: str, place: str) -> ModuleType:
     """The module of a file, executed once in a process."""
     file = Path(place).resolve()
     if not file.is_file():
-        raise UnknownMethod(f"there is no file {place}")
+        raise UnknownMethod(f"method {spec!r}: there is no file {place}")
     name = f"{PREFIX}{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]
