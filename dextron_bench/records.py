@@ -145,10 +145,14 @@ def _insight(source: setting.Source, case: Case, episode: Episode) -> insight.In
     return insight.look(judge, source, case, episode)
 
 
-def conclude(folder: Path, episodes: pd.DataFrame, about: dict[str, Any]) -> None:
-    """Writes the result: every episode's score, from which the leaderboard is computed, and how episodes end."""
+def conclude(folder: Path, episodes: pd.DataFrame, about: dict[str, Any], seconds: float | None = None) -> None:
+    """Writes the result: every episode's score, from which the leaderboard is computed, and how episodes end.
+
+    `seconds` of training are part of where it was made, which differs from one making to the next.
+    """
     made = read_json(folder / CONFIG)
     found = {"splits": scores(episodes), "provenance": read_json(folder / PROVENANCE)}
+    found["provenance"] |= {} if seconds is None else {"seconds": seconds}
     found["maker"] = {name: made[name] for name in MAKER if name in made}
     provenance.write_json(folder / RESULT, {**about, **found})
 

@@ -109,18 +109,18 @@ def execute(plan: Plan, runs: Path, threads: int = 0, report: Report = quiet) ->
     access = (
         {"privileged": "each setting's expert"} if isinstance(agent(method, plan.seed, trained), Privileged) else {}
     )
-    records.conclude(folder, episodes, about | told | access)
+    seconds = course.seconds(plan.seed) if (course := plan.course(runs)) else None
+    records.conclude(folder, episodes, about | told | access, seconds)
     return folder
 
 
 def _cost(plan: Plan, runs: Path) -> dict[str, Any]:
-    """What a run's training took, as far as it is known: demonstrations, and seconds for all seeds of its group."""
+    """What a run's training took: demonstrations, where its method tells how many."""
     course = plan.course(runs)
     if not course:
         return {}
     count = getattr(course.learner, "demonstrations", lambda episodes: None)
-    seconds = course.seconds(plan.seed)
-    return {"demonstrations": count(len(splits.load(course.reaches, "train").cases)), "seconds": seconds}
+    return {"demonstrations": count(len(splits.load(course.reaches, "train").cases))}
 
 
 def evaluate(

@@ -58,7 +58,7 @@ def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[st
     ("words", "latest"),
     [
         (["--method", TOY, "--wait", "0.2"], 0.3),
-        (["--method", "rlil", "--preset", "smoke"], 3.0),
+        (["--method", "rlil", "--preset", "smoke"], 1.0),
     ],
     ids=["toy", "rlil"],
 )

@@ -89,7 +89,9 @@ def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
         _learned_elsewhere(row, training) or _authors(results),
         _largest(each.get("frames") for each in training),
         _largest(each.get("demonstrations") for each in training),
-        _largest(each.get("seconds") for each in training),
+        _largest(
+            [*(each.get("seconds") for each in training), *(each["provenance"].get("seconds") for each in results)]
+        ),
         " / ".join(dict.fromkeys(filter(None, map(_machine, results)))) or None,
         _privileged(row["method"], results),
     )
