@@ -80,3 +80,16 @@ def test_an_unfinished_run_is_not_published(here: Path, complaint: Callable[...,
     line = complaint("leaderboard", "build", "--runs", "runs", "--into", "board")
     assert "no run in runs holds all splits that rank methods" in line
     assert not (here / "board").exists()
+
+
+def test_what_verification_noted_stays_while_nothing_else_changes(here: Path):
+    assert build("--runs", "runs") == 0
+    file = here / "board/results/nothing/synthetic/seed0/result.json"
+    noted = json.loads(file.read_text()) | {"tier": "re-run"}
+    file.write_text(json.dumps(noted))
+    assert build("--runs", "runs") == 0
+    assert json.loads(file.read_text())["tier"] == "re-run"
+    noted["splits"]["test"]["scores"][0] = 20.0
+    file.write_text(json.dumps(noted))
+    assert build("--runs", "runs") == 0
+    assert "tier" not in json.loads(file.read_text())
