@@ -91,15 +91,17 @@ class Forgery:
 def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A sound bundle of two seeds on a tiny benchmark, beside the folder of runs that it was made from."""
     here = tmp_path_factory.mktemp("submission")
-    with pytest.MonkeyPatch.context() as patch:
-        tiny.write(here / "splits", ROWS)
-        tiny.install(here / "splits", patch.setattr)
-        (here / "near.py").write_text(AGENT)
-        entry = contest.Entry("near", f"{here}/near.py:Near", tiny.NAME, (0, 1))
-        folder = contest.compete(entry, here / "runs", 1, Limits(), threads=1)
-        contest.finish(entry, folder, here / "near.zip")
-        yield here
-    tiny.forget()
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            tiny.write(here / "splits", ROWS)
+            tiny.install(here / "splits", patch.setattr)
+            (here / "near.py").write_text(AGENT)
+            entry = contest.Entry("near", f"{here}/near.py:Near", tiny.NAME, (0, 1))
+            folder = contest.compete(entry, here / "runs", 1, Limits(start=300.0, answer=100.0), threads=1)
+            contest.finish(entry, folder, here / "near.zip")
+            yield here
+    finally:
+        tiny.forget()
 
 
 @pytest.fixture
