@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
@@ -39,9 +40,11 @@ ROWS = pd.concat([tiny.ROWS, tiny.ROWS.query("split == 'test'").assign(split="va
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     tiny.write(tmp_path / "splits", ROWS)
     tiny.install(tmp_path / "splits", monkeypatch.setattr)
+    yield
+    tiny.forget()
 
 
 def found(tmp_path: Path, act: str) -> dict[str, Check]:
