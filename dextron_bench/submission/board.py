@@ -14,8 +14,10 @@ import numpy as np
 
 from dextron_bench import methods, provenance, publication, records, rollout, run, splits, tensors, traces, weights
 from dextron_bench.learning import Heir, Learner
+from dextron_bench.page.showreel import FOLDER
 from dextron_bench.submission import bundle, replaying, tables
 from dextron_bench.world import sources
+from dextron_bench.world.archive import MissingData
 
 Report = Callable[[int, int], None]  # Told (episodes done, all).
 
@@ -37,11 +39,12 @@ class Row:
         return f"{self.result['method']}, {self.result['reaches']} reaches, seed {self.result['seed']}"
 
 
-def rows(board: Path, wanted: Sequence[str] = ()) -> list[Row]:
-    """The rows of a board, those of the wanted methods; raises NothingToVerify, DamagedRun."""
+def rows(board: Path, wanted: Sequence[str] = (), reaches: Sequence[str] = ()) -> list[Row]:
+    """The rows of a board, those of the wanted methods and sources; raises NothingToVerify, DamagedRun."""
     files = sorted((board / publication.RESULTS).glob(f"*/*/seed*/{records.RESULT}"))
     found = [Row(file.parent, records.read_result(file)) for file in files]
     kept = [row for row in found if not wanted or row.result["method"] in wanted]
+    kept = [row for row in kept if not reaches or row.result["reaches"] in reaches]
     if not kept:
         known = ", ".join(sorted({row.result["method"] for row in found})) or "none"
         raise NothingToVerify(f"{board} has no such rows; its methods: {known}")
@@ -62,9 +65,12 @@ class Finding:
 
 def check(row: Row, some: int = 0, threads: int = 0, report: Report = lambda done, total: None) -> Finding:
     """Checks a row of a board; of a baseline's splits `some` rows drawn at random, 0 for all."""
-    if (row.folder / records.EPISODES).exists():
-        return _replayed(row, threads, report)
-    return _rerun(row, some, threads, report)
+    try:
+        if (row.folder / records.EPISODES).exists():
+            return _replayed(row, threads, report)
+        return _rerun(row, some, threads, report)
+    except MissingData as error:
+        return Finding("", [f"not checked: {error}"])
 
 
 def stamp(row: Row, finding: Finding) -> bool:
@@ -162,6 +168,8 @@ def pages(board: Path) -> list[str]:
     with TemporaryDirectory() as folder:
         again = Path(folder) / "board"
         shutil.copytree(board, again)
+        if (beside := board.resolve().parent / FOLDER).exists():
+            (Path(folder) / FOLDER).symlink_to(beside)  # The page tells of the recordings beside the board.
         publication.build(again)
         made = [file for file in sorted(again.iterdir()) if file.suffix in (".md", ".csv", ".json", ".html")]
         return [f"{file.name} differs" for file in made if not _same(file, board / file.name)]

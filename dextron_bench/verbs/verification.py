@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
@@ -37,8 +37,10 @@ class Verify:
     """With --all: only so many rows of each split, drawn at random; 0 takes all."""
     method: tuple[str, ...] = ()
     """With --all: only these rows of the table."""
+    reaches: tuple[Literal["real", "synthetic", "minjerk"], ...] = ()
+    """With --all: only rows on these sources; `real` ones need the recorded reaches."""
     stamp: bool = False
-    """With --all: note in the results of baselines that were wholly run again that they were; then build the board."""
+    """With --all: note in the results of baselines that were wholly run again that they were, and build the board."""
     rerun: bool = False
     """Also run the submission's agent again, isolated, from the files in its bundle."""
     board: Path = Path("leaderboard")
@@ -59,10 +61,11 @@ class Verify:
             return told(_verified(opened, self.board, self.rerun, self.threads, self.quiet))
 
     def _board(self) -> int:
+        from dextron_bench import publication
         from dextron_bench.submission import board
 
         sound = True
-        for row in board.rows(self.board, self.method):
+        for row in board.rows(self.board, self.method, self.reaches):
             with progress_bar(row.name, self.quiet) as progress:
                 found = board.check(row, self.rows, self.threads, progress)
             print(f"{row.name}: {found.done if not found.problems else 'NOT what its episodes give'}", flush=True)
@@ -71,6 +74,8 @@ class Verify:
             sound &= not found.problems
             if self.stamp and board.stamp(row, found):
                 print("  its tier is now `re-run`")
+        if self.stamp:
+            publication.build(self.board)
         if problems := board.pages(self.board):
             print("tables and page: NOT what the results give", *problems, sep="\n  ")
         else:
