@@ -95,8 +95,9 @@ def execute(plan: Plan, runs: Path, threads: int = 0, report: Report = quiet) ->
     source = sources.open_source(plan.home)
     learn([plan], runs, threads)
     given = _given(method, plan, runs)
-    if given:
-        agent(method, plan.seed, given)  # Raises before there is a folder.
+    access: dict[str, Any] = {}
+    if isinstance(agent(method, plan.seed, given), Privileged):  # Raises before there is a folder.
+        access = {"privileged": "each setting's expert"}
     records.claim(folder, plan.config())
     trained = weights.adopt(given, folder) if given else None
     about = {"method": plan.label, "reaches": plan.home, "seed": plan.seed}
@@ -106,9 +107,6 @@ def execute(plan: Plan, runs: Path, threads: int = 0, report: Report = quiet) ->
 
     episodes = evaluate(folder, source, wanted, play, plan.record, about, report)
     told = {"training": weights.about(trained) | _cost(plan, runs)} if trained else {}
-    access = (
-        {"privileged": "each setting's expert"} if isinstance(agent(method, plan.seed, trained), Privileged) else {}
-    )
     seconds = course.seconds(plan.seed) if (course := plan.course(runs)) else None
     records.conclude(folder, episodes, about | told | access, seconds)
     return folder

@@ -6,10 +6,11 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import forging
 import pytest
 
 from dextron_bench import cli
@@ -106,3 +107,15 @@ def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
         return printed.err
 
     return run
+
+
+@pytest.fixture(scope="module")
+def submitted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with a sound bundle, near.zip, the agent near.py and the runs that it was made from."""
+    yield from forging.submitted(tmp_path_factory.mktemp("submission"))
+
+
+@pytest.fixture
+def forged(submitted: Path, tmp_path: Path) -> forging.Forgery:
+    """The sound bundle, taken apart."""
+    return forging.taken_apart(submitted / "near.zip", tmp_path)

@@ -15,6 +15,7 @@ from dextron_bench import methods, provenance, records, run, splits
 from dextron_bench.isolation.agent import Isolated, Launch, Limits, launch
 from dextron_bench.rollout import rollout
 from dextron_bench.submission import bundle
+from dextron_bench.submission.declaration import Declaration
 from dextron_bench.world import model, sources
 from dextron_bench.world.setting import Source
 
@@ -25,8 +26,16 @@ class BadSubmission(ValueError):
     """What cannot be submitted; the message says what would be right."""
 
 
-def read_settings(text: str) -> dict[str, Any]:
-    """Settings from JSON; raises BadSubmission."""
+def settle(spec: str, text: str, reaches: str) -> dict[str, Any]:
+    """An agent's settings from JSON; of an installed method all, as it is made for a source of reaches.
+
+    Raises BadSubmission, BadSettings.
+    """
+    found = _read(text)
+    return methods.settings(methods.create(spec, found, reaches)) if spec in methods.known() else found
+
+
+def _read(text: str) -> dict[str, Any]:
     try:
         found = json.loads(text)
     except ValueError as error:
@@ -34,20 +43,6 @@ def read_settings(text: str) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise BadSubmission("settings are a JSON object, like '{\"near\": 0.05}'")
     return found
-
-
-@dataclass(frozen=True, slots=True)
-class Declaration:
-    """What only the authors know: training frames and hours, demonstrations, hardware, and what was looked at."""
-
-    frames: int | None = None
-    demonstrations: int | None = None
-    hours: float | None = None
-    hardware: str = ""
-    privileged: bool = False
-    authors: str = ""
-    url: str = ""
-    notes: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,7 +45,7 @@ class Check:
         from dextron_bench.isolation.agent import Limits, launch
         from dextron_bench.submission import conformance, contest
 
-        how = launch(self.agent, contest.read_settings(self.settings), self.weights)
+        how = launch(self.agent, contest.settle(self.agent, self.settings, self.reaches), self.weights)
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
         found = []
         for check in conformance.checks(how, self.reaches, limits, self.threads):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
+from dextron_bench.submission.declaration import Declaration
 from dextron_bench.verbs.leaderboard import print_rows
 from dextron_bench.verbs.printing import progress_bar
 from dextron_bench.verbs.run import EPISODES_FAILED
@@ -37,22 +38,8 @@ class Submit:
     """The bundle; by default NAME-REACHES.zip here."""
     record: int = 1
     """Add recordings (.rrd) of the first so many rows of each split; every episode can be replayed in any case."""
-    frames: int | None = None
-    """Declared: control steps that it was trained for."""
-    demonstrations: int | None = None
-    """Declared: expert episodes that it learned from."""
-    hours: float | None = None
-    """Declared: hours of training."""
-    hardware: str = ""
-    """Declared: what it was trained on."""
-    privileged: bool = False
-    """Declared: it is told more than the 48 numbers of the state."""
-    authors: str = ""
-    """Declared: whose it is."""
-    url: str = ""
-    """Declared: where to read about it."""
-    notes: str = ""
-    """Declared: anything else."""
+    declared: tyro.conf.OmitArgPrefixes[Declaration] = field(default_factory=Declaration)
+    """What only the authors know; nothing checks it."""
     timeout: float = 10.0
     """Seconds that one answer may take."""
     memory: float = 4.0
@@ -88,7 +75,6 @@ class Submit:
     def _entry(self) -> Any:
         from dextron_bench.submission import contest
 
-        declared = contest.Declaration(**{each.name: getattr(self, each.name) for each in fields(contest.Declaration)})
         seeds = tuple(dict.fromkeys(self.seed))
-        settings = contest.read_settings(self.settings)
-        return contest.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, declared)
+        settings = contest.settle(self.agent, self.settings, self.reaches)
+        return contest.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared)

@@ -1,0 +1,98 @@
+"""Submissions through the command line, and the whole leaderboard verified."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dextron_bench import cli
+from dextron_bench.submission import contest, merging
+
+
+def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
+    submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    words = [
+        "submit",
+        f"{submitted}/near.py:Near",
+        "--name",
+        "mine",
+        "--seed",
+        "0",
+        "--settings",
+        '{"near": 0.05}',
+        "--quiet",
+    ]
+    assert cli.main(words) == 0
+    assert "mine-synthetic.zip" in capsys.readouterr().out
+    assert cli.main(["leaderboard", "verify", "mine-synthetic.zip", "--rerun"]) == 0
+    assert "re-run; 4 of 4 episodes equal bit for bit" in capsys.readouterr().out
+    assert cli.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board"]) == 0
+    assert "| `mine` |" in (tmp_path / "board" / "README.md").read_text()
+    assert cli.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board"]) == 2
+    assert "--replace puts this one in its place" in capsys.readouterr().err
+    assert cli.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board", "--replace"]) == 0
+    assert cli.main(["leaderboard", "verify", "--all", "--board", "board"]) == 0
+    assert "mine, synthetic reaches, seed 0: replayed, 4 of 4 episodes" in capsys.readouterr().out
+    file = tmp_path / "board/results/mine/synthetic/seed0/result.json"
+    file.write_text(file.read_text().replace("0.0", "20.0", 1))
+    assert cli.main(["leaderboard", "verify", "--all", "--board", "board"]) == 1
+    told = capsys.readouterr().out
+    assert "NOT what its episodes give" in told
+    assert "table.csv differs" in told
+
+
+def test_a_board_of_baselines_is_run_again(submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """Dice fall otherwise when only some rows are played, so that all are."""
+    runs, board = str(tmp_path / "runs"), tmp_path / "board"
+    assert cli.main(["run", "--method", "exp", "--record", "0", "--runs", runs, "--quiet"]) == 0
+    assert cli.main(["leaderboard", "build", "--runs", runs, "--into", str(board)]) == 0
+    capsys.readouterr()
+    assert cli.main(["leaderboard", "verify", "--all", "--rows", "1", "--board", str(board)]) == 0
+    told = capsys.readouterr().out
+    assert "exp, synthetic reaches, seed 0: run again, 2 of 4 episodes, all equal" in told
+    assert "random, synthetic reaches, seed 0: run again" in told
+    copied = board / "results/best/synthetic/seed0"
+    shutil.copytree(board / "results/exp/synthetic/seed0", copied)
+    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
+    assert "lies in best/synthetic/seed0, but was made by exp" in capsys.readouterr().out
+    shutil.rmtree(copied.parents[1])
+    file = board / "results/exp/synthetic/seed0/result.json"
+    file.write_text(file.read_text().replace("20.0", "19.0", 1))
+    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
+    assert "says return 19; run again it is 20" in capsys.readouterr().out
+    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "none"]) == 2
+    assert "its methods: exp, nothing, random" in capsys.readouterr().err
+
+
+def test_what_cannot_be_submitted_is_said(submitted: Path, capsys: pytest.CaptureFixture[str]):
+    for words, why in (
+        (["--name", "a/b"], "the name 'a/b' is not one"),
+        (["--name", "a", "--seed", "3"], "seeds are 0, 1, 2 and so on"),
+        (["--name", "a", "--settings", "1"], "settings are a JSON object"),
+        (["--name", "a", "--settings", "{"], "--settings is no JSON"),
+    ):
+        assert cli.main(["submit", f"{submitted}/near.py:Near", *words]) == 2
+        assert why in capsys.readouterr().err
+    assert cli.main(["leaderboard", "verify"]) == 2
+    assert "name a submission, or give --all" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["exp", "Exp", "rlil-0.3", "RLIL-0.1-mine", "exp\n", "first", "FIRST"])
+def test_names_that_are_or_look_like_anothers_are_refused(name: str, tmp_path: Path):
+    (tmp_path / "results" / "first" / "real" / "seed0").mkdir(parents=True)
+    with pytest.raises(contest.BadSubmission):
+        merging.check_name(name, "synthetic", tmp_path, replace=True)
+    merging.check_name("first-of-mine", "synthetic", tmp_path, replace=False)
+
+
+def test_settings_of_an_installed_method_are_those_with_which_it_can_be_made_again():
+    settled = contest.settle("omega", '{"near": 0.1}', "synthetic")
+    assert settled["near"] == 0.1
+    assert len(settled["sha256"]) == 64
+    assert contest.settle("omega", json.dumps(settled), "synthetic") == settled
+    assert contest.settle("mine.py:Mine", '{"near": 0.1}', "synthetic") == {"near": 0.1}
