@@ -9,6 +9,9 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+import onnx
+import onnx.helper
+import onnx.numpy_helper
 import pytest
 import torch
 from brief import SOURCE
@@ -220,6 +223,30 @@ def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
         play(str(file))
     with pytest.raises(policies.BadPolicy, match=r"known kinds end in \.pt, \.onnx"):
         policies.load(tmp_path / "policy.pkl")
+
+
+def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):
+    """The policy's action is -4 times the palm's x, within [-1, 1]."""
+    states = onnx.helper.make_tensor_value_info("states", onnx.TensorProto.FLOAT, ["N", 48])
+    actions = onnx.helper.make_tensor_value_info("actions", onnx.TensorProto.FLOAT, ["N", 1])
+    choice = onnx.numpy_helper.from_array(np.eye(48, 1, -7, dtype=np.float32) * np.float32(-4.0), "choice")
+    bounds = [onnx.numpy_helper.from_array(np.array(end, np.float32), name) for name, end in (("low", -1), ("high", 1))]
+    nodes = [
+        onnx.helper.make_node("MatMul", ["states", "choice"], ["chosen"]),
+        onnx.helper.make_node("Clip", ["chosen", "low", "high"], ["actions"]),
+    ]
+    graph = onnx.helper.make_graph(nodes, "policy", [states], [actions], [choice, *bounds])
+    model = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 18)], ir_version=10)
+    file = tmp_path / "policy.onnx"
+    onnx.save(model, str(file))
+    for episode in play(str(file), CASES[:1]):
+        seen = episode.states[: len(episode.actions), 7:8].astype(np.float32)
+        expected = np.clip(np.float32(-4.0) * seen, -1.0, 1.0)
+        assert len(np.unique(expected)) > 10
+        np.testing.assert_array_equal(episode.actions, expected)
+    file.write_bytes(file.read_bytes()[:100])
+    with pytest.raises(AgentError, match="is no ONNX file that can be run"):
+        play(str(file))
 
 
 @given(st.binary(max_size=200), st.integers(1, 5))
