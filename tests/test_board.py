@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench import cli
+from dextron_bench import cli, recording
 from dextron_bench.submission import contest, merging
 
 
@@ -44,6 +44,29 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     told = capsys.readouterr().out
     assert "NOT what its episodes give" in told
     assert "table.csv differs" in told
+
+
+def test_any_episode_of_a_bundle_is_recorded_where_it_is_looked_at(
+    submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    """The bundle has the recording of row 0 alone; row 2 of `test` is the one that failed."""
+    monkeypatch.chdir(tmp_path)
+    bundle = str(submitted / "near.zip")
+    assert cli.main(["view", bundle, "--print"]) == 0
+    assert {Path(line).name for line in capsys.readouterr().out.split()} == {"test-0000.rrd", "unseen-reach-0000.rrd"}
+    assert cli.main(["view", bundle, "--print", "--failed", "--seed", "1", "--quiet"]) == 0
+    [file] = capsys.readouterr().out.split()
+    assert file.endswith("seed1/recordings/test-0002.rrd")
+    told = recording.read(Path(file))
+    assert (told.properties["method"], told.episode.score) == ("near", 0.0)
+    assert cli.main(["view", bundle, "--print", "--failed", "--seed", "1", "--quiet"]) == 0
+    assert capsys.readouterr().out.split() == [file]
+    cut = tmp_path / "cut.zip"
+    cut.write_bytes(Path(bundle).read_bytes()[:-30])
+    for place, why in ((cut, "is no whole zip file"), (tmp_path / "none.zip", "there is no file")):
+        assert cli.main(["view", str(place), "--print"]) == 2
+        assert why in capsys.readouterr().err
+    assert sorted(path.name for path in (tmp_path / "runs/submissions/.bundles").iterdir()) == [Path(file).parts[3]]
 
 
 def test_a_board_of_baselines_is_run_again(submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):

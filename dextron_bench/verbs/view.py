@@ -35,11 +35,13 @@ class View:
 
     Example: dextron-bench view --diff runs/bc-quick/real/seed0 runs/rlil-0.1-quick/real/seed0
 
+    Example: dextron-bench view my-agent-synthetic.zip --failed
+
     Example: dextron-bench view --worst 5 --method rlil-0.1 --reaches real --split unseen-subject --seed 0
     """
 
-    place: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN|FILE|DIR ...")] = ()
-    """Folders of runs or recordings, or single recordings; by default the folder of all runs."""
+    place: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN|FILE|DIR|ZIP ...")] = ()
+    """Folders of runs or recordings, single recordings, or submissions; by default the folder of all runs."""
     worst: int | None = None
     """Pick so many episodes with the lowest return."""
     best: int | None = None
@@ -76,25 +78,33 @@ class View:
 
         if self.live:
             return self._perform()
-        places, wish = self.place or (self.runs,), self._wish()
-        files = [self._side_by_side(wish)] if self.diff else self._found(places, wish)
+        places, wish = self._places(), self._wish()
+        files = [self._side_by_side(places, wish)] if self.diff else self._found(places, wish)
         if self.print:
             print(*files, sep="\n")
         else:
             recording.view(files)
         return 0
 
+    def _places(self) -> list[Path]:
+        """Where to look; a submission is unpacked in the folder of runs."""
+        from dextron_bench.submission.opened import opened
+
+        places = self.place or (self.runs,)
+        return [opened(place, self.runs) if place.suffix == ".zip" else place for place in places]
+
     def _found(self, places: Sequence[Path], wish: Wish) -> list[Path]:
         from dextron_bench import gallery
 
         return gallery.recordings(places) if wish == gallery.Wish() else self._picked(places, wish)
 
-    def _side_by_side(self, wish: Wish) -> Path:
+    def _side_by_side(self, places: Sequence[Path], wish: Wish) -> Path:
         from dextron_bench import contrast, gallery
 
-        if len(self.place) != 2:
+        if len(places) != 2:
             raise gallery.BadWish(f"--diff takes two places, recordings or runs; it got {len(self.place)}")
-        return contrast.contrast(*self.place, wish, self.runs)
+        first, second = places
+        return contrast.contrast(first, second, wish, self.runs)
 
     def _perform(self) -> int:
         from dextron_bench import gallery, live, recording, splits
