@@ -173,6 +173,13 @@ def test_nan_fails_one_episode_and_a_crash_those_that_were_played(made: Callable
     assert len(third.actions) > 10
 
 
+def test_what_is_slow_in_all_is_stopped_for_good(made: Callable[[str], str]):
+    """Starting the process alone takes longer than a millisecond; with two slots the third episode comes after it."""
+    first, second, third = play(made(CLOSES), total=0.001)
+    assert first.failure == second.failure == "it has had the 0.001 s that all its answers may take at step 1"
+    assert third.failure == "it has had the 0.001 s that all its answers may take at step 0"
+
+
 @pytest.mark.parametrize(
     ("line", "why"),
     [

@@ -4,34 +4,28 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import queue
 import shlex
-import signal
-import subprocess
 import sys
 import tempfile
-import threading
-from collections.abc import Sequence
+import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
 from dextron_bench.isolation import sandbox, wire
+from dextron_bench.isolation.process import Process, Silent
 from dextron_bench.rollout import AgentDown, AgentError
-
-KEPT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT", "VIRTUAL_ENV")  # Of the environment.
-TAIL = 2000  # [bytes] of what an agent writes to its stderr that are looked at.
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Seconds to start, seconds for one answer, and bytes of memory."""
+    """Seconds to start, for one answer, and for starts and answers of a split altogether; and bytes of memory."""
 
     start: float = 60.0
     answer: float = 10.0
+    total: float = 3600.0
     memory: int = 4 * 2**30
 
 
@@ -93,9 +87,10 @@ class Isolated:
 
     def __init__(self, how: Launch, seed: int = 0, limits: Limits | None = None) -> None:
         self._how, self._seed, self._limits = how, seed, limits or Limits()
-        self._process: _Process | None = None
+        self._process: Process | None = None
         self._begun: list[int] = []
         self._scratch = tempfile.TemporaryDirectory(prefix="dextron-agent-", ignore_cleanup_errors=True)
+        self._spent = 0.0  # [s] for starts and answers so far.
         self.starts = 0
         self.peak = 0  # [bytes] of memory at most, as last seen; 0 where the system does not tell.
 
@@ -117,25 +112,34 @@ class Isolated:
     def act(self, states: np.ndarray) -> np.ndarray:
         """Actions (N, 1) for states (N, 48); raises AgentDown, AgentError."""
         begun, self._begun = sorted(set(self._begun)), []
-        process = self._process or self._start(len(states))
+        if self._spent > self._limits.total:
+            self._stop()
+            raise AgentDown(f"it has had the {self._limits.total:g} s that all its answers may take")
+        asked = time.monotonic()
         try:
-            line = process.ask(wire.question(begun, states), self._limits.answer)
-            return wire.actions(line, len(states))
-        except (wire.BadAnswer, _Silent) as error:
+            return self._answer(wire.question(begun, states), len(states))
+        finally:
+            self._spent += time.monotonic() - asked
+
+    def _answer(self, question: bytes, count: int) -> np.ndarray:
+        process = self._process or self._start(count)
+        try:
+            return wire.actions(process.ask(question, self._limits.answer), count)
+        except (wire.BadAnswer, Silent) as error:
             why = process.epitaph(error)
             self._stop()
             raise AgentDown(why) from error
 
-    def _start(self, episodes: int) -> _Process:
+    def _start(self, episodes: int) -> Process:
         self.starts += 1
         try:
             words = self._how.words(self._scratch.name, self._limits.memory)
-            process = self._process = _Process(words, self._scratch.name, wire.longest(episodes))
+            process = self._process = Process(words, self._scratch.name, wire.longest(episodes))
         except (OSError, IndexError) as error:
             raise AgentError(f"the agent's process cannot be started: {error}") from error
         try:
             wire.greeted(process.ask(wire.greeting(self._seed, episodes), self._limits.start))
-        except (wire.BadAnswer, _Silent) as error:
+        except (wire.BadAnswer, Silent) as error:
             why = process.epitaph(error)
             self._stop()
             raise (AgentDown if self.starts > 1 else AgentError)(f"the agent did not start: {why}") from error
@@ -146,112 +150,3 @@ class Isolated:
             self.peak = max(self.peak, self._process.peak())
             self._process.kill()
             self._process = None
-
-
-class _Silent(RuntimeError):
-    """A process from which no answer came."""
-
-
-class _Process:
-    """A process that is asked by lines; threads read and write, so that neither side can hang us."""
-
-    def __init__(self, words: Sequence[str], folder: str, room: int) -> None:
-        """Starts it in a folder; its answers may have `room` bytes."""
-        environment = {name: os.environ[name] for name in KEPT if name in os.environ}
-        environment |= {"HOME": folder, "TMPDIR": folder, "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `kill`)
-        self._popen = subprocess.Popen(
-            words,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            cwd=folder,
-            env=environment,
-            start_new_session=True,
-        )
-        self._questions: queue.Queue[bytes | None] = queue.Queue()
-        self._answers: queue.Queue[bytes] = queue.Queue(2)  # One that is due, and one that tells of too many.
-        self._room = room
-        assert self._popen.stdin
-        assert self._popen.stdout
-        threading.Thread(target=self._write, args=(self._popen.stdin,), daemon=True).start()
-        threading.Thread(target=self._read, args=(self._popen.stdout,), daemon=True).start()
-
-    def ask(self, question: bytes, seconds: float) -> bytes:
-        """The line that answers; raises _Silent."""
-        if not self._answers.empty() and (extra := self._answers.get()):
-            raise _Silent(f"it wrote {len(extra)} bytes that nobody asked for")
-        self._questions.put(question)
-        try:
-            line = self._answers.get(timeout=seconds)
-        except queue.Empty:
-            raise _Silent(f"it gave no answer within {seconds:g} s") from None
-        if not line.endswith(b"\n"):
-            raise _Silent(f"its answer is longer than {self._room} bytes" if len(line) > self._room else "it ended")
-        return line
-
-    def epitaph(self, error: Exception) -> str:
-        """What went wrong, with how the process ended and the last line that it wrote to stderr."""
-        if str(error) == "it ended":
-            try:
-                code = self._popen.wait(1.0)
-            except subprocess.TimeoutExpired:
-                code = None
-            error = _Silent(f"it ended with {_told(code)}")
-        self._said.seek(max(0, self._said.seek(0, os.SEEK_END) - TAIL))
-        lines = self._said.read().decode(errors="replace").split("\n")
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-        return f"{error}: {last}" if last else str(error)
-
-    def peak(self) -> int:
-        """The most memory [bytes] that the process has held, 0 where the system does not tell."""
-        try:
-            return max(map(_peak, _family(self._popen.pid)))
-        except (OSError, ValueError):
-            return 0
-
-    def kill(self) -> None:
-        """Ends the process and what it started."""
-        self._questions.put(None)
-        try:
-            os.killpg(self._popen.pid, signal.SIGKILL)
-        except (OSError, AttributeError):
-            self._popen.kill()
-        self._popen.wait()
-        self._said.close()
-
-    def _write(self, pipe: IO[bytes]) -> None:
-        try:
-            while (question := self._questions.get()) is not None:
-                pipe.write(question)
-                pipe.flush()
-            pipe.close()
-        except OSError:
-            pass  # It ended; the reader tells.
-
-    def _read(self, pipe: IO[bytes]) -> None:
-        with pipe:
-            while line := pipe.readline(self._room + 1):
-                self._answers.put(line)
-                if not line.endswith(b"\n"):
-                    return
-        self._answers.put(b"")
-
-
-def _told(code: int | None) -> str:
-    """How a process ended, from its exit code; a shell's for a signal is 128 and more."""
-    number = -code if code is not None and code < 0 else code - 128 if code is not None and code > 128 else 0
-    known = {each.value: each.name for each in signal.Signals}
-    return f"signal {known[number]}" if number in known else f"code {code}"
-
-
-def _family(process: int) -> list[int]:
-    """A process and all that came of it."""
-    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
-    return [process, *(each for child in children for each in _family(int(child)))]
-
-
-def _peak(process: int) -> int:
-    """The most memory [bytes] that a process has held."""
-    lines = Path(f"/proc/{process}/status").read_text().splitlines()
-    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")), 0)

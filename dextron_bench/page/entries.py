@@ -13,7 +13,6 @@ from dextron_bench import methods
 
 TIERS = ("self-reported", "replayed", "re-run")  # The least checked first.
 QUOTED = "quoted"
-CEILING = "exp"  # Told each setting's expert: not an entrant.
 Result = dict[str, Any]
 
 
@@ -72,7 +71,7 @@ def tier(results: Sequence[Result]) -> str:
 
 def role(method: str) -> str | None:
     """What a method is that is no entrant."""
-    if method == CEILING:
+    if method in methods.CEILINGS:
         return "ceiling"
     return "floor" if method in methods.FLOORS else None
 
@@ -139,4 +138,4 @@ def _privileged(method: str, results: Sequence[Result]) -> str | None:
     """What an agent was given beside the state, as was declared."""
     told = [str(result["privileged"]) for result in results if result.get("privileged")]
     told += ["more than the state, as declared" for each in results if (each.get("declared") or {}).get("privileged")]
-    return told[0] if told else ("each setting's expert" if method == CEILING else None)
+    return told[0] if told else ("each setting's expert" if method in methods.CEILINGS else None)
