@@ -38,6 +38,10 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     assert cli.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board", "--replace"]) == 0
     assert cli.main(["leaderboard", "verify", "--all", "--board", "board"]) == 0
     assert "mine, synthetic reaches, seed 0: replayed, 4 of 4 episodes" in capsys.readouterr().out
+    again = ["submit", f"{submitted}/near.py:Near", "--name", "other", "--seed", "0", "--board", "board", "--quiet"]
+    assert cli.main(again) == 0
+    told = capsys.readouterr().out
+    assert told.count("│ mine ") == told.count("│ other ") == 2  # On `test` and `unseen-reach`.
     file = tmp_path / "board/results/mine/synthetic/seed0/result.json"
     file.write_text(file.read_text().replace("0.0", "20.0", 1))
     assert cli.main(["leaderboard", "verify", "--all", "--board", "board"]) == 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -12,6 +12,9 @@ from dextron_bench.submission.declaration import Declaration
 from dextron_bench.verbs.leaderboard import print_rows
 from dextron_bench.verbs.printing import progress_bar
 from dextron_bench.verbs.run import EPISODES_FAILED
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,8 @@ class Submit:
     """GiB of memory that the agent may take."""
     runs: Path = Path("runs")
     """Folder of all runs."""
+    board: Path = Path("leaderboard")
+    """Folder of the leaderboard, among whose methods it is shown."""
     threads: int = 0
     """Threads of the simulation; 0 takes one for each processor. Results do not depend on it."""
     quiet: bool = False
@@ -54,7 +59,6 @@ class Submit:
     """Settings of a method or class, as JSON, like '{"near": 0.05}'."""
 
     def __call__(self) -> int:
-        from dextron_bench import leaderboard, records
         from dextron_bench.isolation.agent import Limits
         from dextron_bench.submission import contest
 
@@ -64,8 +68,7 @@ class Submit:
         with progress_bar(entry.name, self.quiet) as progress:
             folder = contest.compete(entry, self.runs, self.record, limits, self.threads, progress)
         contest.finish(entry, folder, file)
-        rows = leaderboard.table(records.read_result(folder / f"seed{seed}" / records.RESULT) for seed in entry.seeds)
-        print_rows(rows, as_json=False)
+        print_rows(self._standing(folder), as_json=False)
         failures = contest.failures(folder, entry.seeds)
         for why, count in failures.items():
             print(f"{count} episodes failed: {why}")
@@ -78,3 +81,12 @@ class Submit:
         seeds = tuple(dict.fromkeys(self.seed))
         settings = contest.settle(self.agent, self.settings, self.reaches)
         return contest.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared)
+
+    def _standing(self, folder: Path) -> pd.DataFrame:
+        """The leaderboard's rows on these reaches, this submission's among them."""
+        from dextron_bench import leaderboard, publication, records, splits
+
+        own = [records.read_result(folder / f"seed{seed}" / records.RESULT) for seed in dict.fromkeys(self.seed)]
+        others = (each for each in records.results(self.board / publication.RESULTS) if each["method"] != self.name)
+        rows = leaderboard.table([*own, *(each for each in others if each["reaches"] == self.reaches)])
+        return rows[rows["split"].isin(splits.evaluated(self.reaches))]
