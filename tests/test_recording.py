@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -19,9 +20,9 @@ from hypothesis import strategies as st
 from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench import recording
-from dextron_bench.recording import archive, layout, scene, storage
+from dextron_bench.recording import archive, layout, scene, shapes, storage
 from dextron_bench.rollout import Episode
-from dextron_bench.world import model, reach, task
+from dextron_bench.world import dressing, model, reach, task
 from dextron_bench.world.setting import Setting
 
 PROPERTIES: dict[str, recording.Value] = {
@@ -127,15 +128,19 @@ def test_poses_contacts_and_signals_are_read_back_as_they_are(file: Path) -> Non
     kept = [chunk for chunk in RrdReader(file).store().stream().to_chunks() if not chunk.is_static]
     found = {(chunk.entity_path, name): column for chunk in kept for name, column in columns(chunk).items()}
     positions, quaternions, touched = scene.poses(made.states)
-    for body in range(1, positions.shape[1]):
-        entity = scene._entity(body)
+    for body, entity in ((model.load().body(name).id, f"/world/{name}") for name in ("palm", "bottle")):
         np.testing.assert_array_equal(found[entity, "Transform3D:translation"], positions[:, body].astype(np.float32))
         turned = quaternions[:, body][:, [1, 2, 3, 0]].astype(np.float32)
         np.testing.assert_array_equal(found[entity, "Transform3D:quaternion"], turned)
     points = np.concatenate(touched).astype(np.float32)
     np.testing.assert_array_equal(found[scene.CONTACTS, "Points3D:positions"].reshape(-1, 3), points)
+    for kind, geoms in shapes.fingers().items():
+        form, entity = shapes.SIMPLE[kind], f"/world/fingers/{shapes.SIMPLE[kind].name}"
+        there, turns = (each.astype(np.float32) for each in scene.placed(positions, quaternions, geoms))
+        name = form.archetype.__name__
+        np.testing.assert_array_equal(found[entity, f"{name}:{form.place}"], there.reshape(-1, 3))
+        np.testing.assert_array_equal(found[entity, f"{name}:quaternions"], turns.reshape(-1, 4)[:, [1, 2, 3, 0]])
     centre = task.palm_centre(made.states)
-    np.testing.assert_array_equal(found["/world/palm_centre", "Points3D:positions"], centre.astype(np.float32))
     legs = np.stack([centre[:-1], centre[1:]], axis=1).reshape(-1, 3)
     np.testing.assert_array_equal(found[scene.TRACE, "LineStrips3D:strips"], legs.astype(np.float32))
     np.testing.assert_array_equal(found["/signals/closure", "Scalars:scalars"][:, 0], task.closure(made.states))
@@ -246,18 +251,26 @@ def test_arrays_that_make_no_episode_are_refused(file: Path, broken: str) -> Non
 
 def test_a_recording_of_150_steps_stays_under_600_kb(file: Path) -> None:
     recording.write(file, episode(150), PATH, PROPERTIES)
-    assert file.stat().st_size < 600_000
+    assert file.stat().st_size < 500_000
 
 
-def test_capsules_lie_where_the_physics_has_them() -> None:
-    """Rerun's run from their translation along +z; both ends must be the ends that hand.xml gives by `fromto`."""
-    chunk = next(chunk for chunk in scene.props() if chunk.entity_path == "/world/index_distal")
-    row = chunk.to_record_batch().to_pydict()
-    start, length = np.array(row["Capsules3D:translations"][0][0]), row["Capsules3D:lengths"][0][0]
-    x, y, z, w = row["Capsules3D:quaternions"][0][0]
-    along = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-    ends = {tuple(np.round(point, 5)) for point in (start, start + length * along)}
-    assert ends == {(-0.00098, -0.00249, 0.0), (0.03932, 0.02309, 0.0)}
+def test_the_fingers_shapes_are_where_the_physics_has_them() -> None:
+    """MuJoCo's own places and turns of all 27; Rerun's capsules run from their start along +z, MuJoCo's are centred."""
+    made, drawn = episode(1), dressing.dressed()
+    data = mujoco.MjData(drawn)
+    data.qpos[:] = made.states[1, : drawn.nq]
+    mujoco.mj_kinematics(drawn, data)
+    positions, quaternions, _ = scene.poses(made.states)
+    counted = 0
+    for kind, geoms in shapes.fingers().items():
+        there, turns = (each[1] for each in scene.placed(positions, quaternions, geoms))
+        w, x, y, z = turns.T
+        along = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
+        np.testing.assert_allclose(along, data.geom_xmat[geoms].reshape(-1, 3, 3)[:, :, 2], atol=1e-12)
+        half = drawn.geom_size[geoms, 1:2] * (kind == mujoco.mjtGeom.mjGEOM_CAPSULE)
+        np.testing.assert_allclose(there + half * along, data.geom_xpos[geoms], atol=1e-12)
+        counted += len(geoms)
+    assert counted == 27
 
 
 def test_bodies_move_as_the_states_say() -> None:

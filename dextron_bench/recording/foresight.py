@@ -36,7 +36,8 @@ def chunks(insight: Insight, actions: np.ndarray, first: int = 0) -> Iterable[Ch
 def ridge(insight: Insight, actions: np.ndarray, last: int, success: bool | None = None) -> Iterable[Chunk]:
     """The curves of an episode that ends at step `last`, one above the other, later ones higher; actions are (T,).
 
-    They are green where the outcome is foretold, red where it is not, and blue while it is not known.
+    They are green where the outcome is foretold, red where it is not, and blue while it is not known. After them come
+    as many ticks, at the actions that were taken.
     """
     steps, grid = len(actions), np.linspace(-WIDTH, WIDTH, insight.curves.shape[1])
     base = -HEIGHT * np.arange(steps) / max(last, 1)  # The view's y goes down.
@@ -45,10 +46,12 @@ def ridge(insight: Insight, actions: np.ndarray, last: int, success: bool | None
     shown = np.arange(0, steps, max(1, last // RIDGES))
     right = (insight.chances[shown] > THRESHOLD) == success
     colours = np.where(right[:, None], RIGHT, WRONG) if success is not None else np.array([BARS])
-    curves = rr.LineStrips2D(strips[shown], colors=colours.astype(np.uint8), radii=[0.008])
-    yield scene.static("/ridge/curves", curves)
     ticks = np.stack([actions, base, actions, base - RISE / 2], axis=1).reshape(-1, 2, 2).astype(np.float32)
-    yield scene.static("/ridge/actions", rr.LineStrips2D(ticks[shown], colors=[TICK], radii=[0.012]))
+    lines, tick = [*strips[shown], *ticks[shown]], np.tile(TICK, (len(shown), 1))
+    colours = np.concatenate([np.broadcast_to(colours, tick.shape), tick]).astype(np.uint8)
+    yield scene.static(
+        "/ridge/curves", rr.LineStrips2D(lines, colors=colours, radii=np.repeat([0.008, 0.012], len(shown)))
+    )
     yield scene.static("/ridge/axis", *_axis(insight.duration, last))
     when = scene.timelines(0, steps - 1)
     now = np.stack([[[-1.1 * WIDTH, y], [1.1 * WIDTH, y]] for y in base]).astype(np.float32)

@@ -21,7 +21,7 @@ class Section:
 
 
 def loft(
-    sections: list[Section], power: float = 2.0, domes: tuple[float, float] = (0.0, 0.0), sides: int = 24
+    sections: list[Section], power: float = 2.0, domes: tuple[float, float] = (0.0, 0.0), sides: int = 20
 ) -> Shell:
     """The surface through sections in rising z; 2 is elliptic, more is boxier; ends bulge by `domes` [m]."""
     rows = np.array([[s.z, s.x, s.y, s.dx, s.dy] for s in sections])
