@@ -88,6 +88,7 @@ VERBS: dict[str, type[Verb] | Group] = {
 }
 
 DONE, DIFFERS, USAGE, EPISODES_FAILED, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130  # Exit codes.
+BLAS = "OPENBLAS_NUM_THREADS"  # NumPy's products are small here: threads would mostly wait for each other.
 OWN = ("dextron_bench", "baselines")  # Exceptions defined here are messages to the user.
 DESCRIPTION = """Grasping with a prosthetic hand that a person moves: a benchmark.
 
@@ -97,6 +98,7 @@ Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or inpu
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one verb and returns its exit code; `arguments` default to the process's own."""
+    os.environ.setdefault(BLAS, "1")  # Before NumPy is imported.
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words or bool(os.environ.get("DEXTRON_DEBUG"))
     words = [word for word in words if word != "--debug"]

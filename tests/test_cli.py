@@ -251,6 +251,19 @@ def test_help_and_the_package_itself_import_nothing_heavy():
     assert not HEAVY & set(loaded.split())
 
 
+def test_products_of_numpy_take_one_thread_unless_it_is_said_otherwise():
+    script = (
+        "from dextron_bench.cli import main; main(['--version']); import numpy, threadpoolctl; "
+        "print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
+    )
+    inherited = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    for more, threads in (({}, "{1}"), ({"OPENBLAS_NUM_THREADS": "2"}, "{2}")):
+        done = subprocess.run(
+            [sys.executable, "-c", script], env=inherited | more, capture_output=True, text=True, check=True
+        )
+        assert done.stdout.endswith(f"{threads}\n")
+
+
 @pytest.mark.parametrize("order", ["dextron_bench, gymnasium", "gymnasium, dextron_bench"])
 def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
     find = "import importlib.util; importlib.util.find_spec('gymnasium')"  # Looking is not importing.
