@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO
 
 KEPT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT", "VIRTUAL_ENV")  # Of the environment.
+ENDING = 5.0  # [s] that a process which has closed its output may take to end.
 TAIL = 2000  # [bytes] of what an agent writes to its stderr that are looked at.
 
 
@@ -62,7 +63,7 @@ class Process:
         """What went wrong, with how the process ended and the last line that it wrote to stderr."""
         if str(error) == "it ended":
             try:
-                code = self._popen.wait(1.0)
+                code = self._popen.wait(ENDING)
             except subprocess.TimeoutExpired:
                 code = None
             error = Silent(f"it ended with {_told(code)}")
