@@ -10,7 +10,7 @@ import rerun as rr
 from rerun.chunk import Chunk
 
 from dextron_bench.recording import shapes
-from dextron_bench.world import dressing, model, reach, rotation, task
+from dextron_bench.world import model, reach, task
 
 TRACE = "/world/trace"  # One leg a step; the layout shows those up to now.
 CONTACTS = "/world/contacts"
@@ -41,9 +41,8 @@ def chunks(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
         turns = quaternions[:, body][:, shapes.XYZW]
         moves = rr.Transform3D.columns(translation=positions[:, body], quaternion=turns)
         yield Chunk.from_columns(_entity(body), when, moves)
-    for kind, geoms in shapes.fingers().items():
-        moves = shapes.SIMPLE[kind].moves(*placed(positions, quaternions, geoms))
-        yield Chunk.from_columns(_fingers(kind), when, moves)
+    for parts in shapes.fingers():
+        yield Chunk.from_columns(parts.entity, when, parts.shape.moves(*parts.placed(positions, quaternions)))
     points = rr.Points3D.columns(positions=np.concatenate(touched)).partition([len(each) for each in touched])
     yield Chunk.from_columns(CONTACTS, when, points)
     centre = task.palm_centre(states)
@@ -80,21 +79,9 @@ def poses(states: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]
     return positions, quaternions, touched
 
 
-def placed(positions: np.ndarray, quaternions: np.ndarray, geoms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World positions (T, G, 3) of shapes' origins and quaternions wxyz (T, G, 4), from those of all bodies."""
-    drawn = dressing.dressed()
-    there, turned = positions[:, drawn.geom_bodyid[geoms]], quaternions[:, drawn.geom_bodyid[geoms]]
-    return there + rotation.rotate(turned, shapes.origins(geoms)), rotation.multiply(turned, drawn.geom_quat[geoms])
-
-
 def _entity(body: int) -> str:
     """Where a body hangs."""
     return f"/world/{model.load().body(body).name}"
-
-
-def _fingers(kind: int) -> str:
-    """Where the fingers' shapes of a kind hang."""
-    return f"/world/fingers/{shapes.SIMPLE[kind].name}"
 
 
 def props() -> list[Chunk]:
@@ -105,5 +92,5 @@ def props() -> list[Chunk]:
     kept.append(static(CONTACTS, rr.Points3D.from_fields(radii=[0.004], colors=[CONTACT_COLOUR])))
     kept.append(static(TRACE, rr.LineStrips3D.from_fields(radii=[0.002], colors=[TRACE_COLOUR])))
     kept += [static(_entity(body), *parts) for body, parts in whole.items()]
-    kept += [static(_fingers(kind), shapes.SIMPLE[kind].look(geoms)) for kind, geoms in shapes.fingers().items()]
+    kept += [static(parts.entity, parts.shape.look(parts.geoms)) for parts in shapes.fingers()]
     return kept

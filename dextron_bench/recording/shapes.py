@@ -71,10 +71,39 @@ def bodies() -> Mapping[int, Kinds]:
     return {int(body): _kinds(drawn.geom_bodyid == body) for body in whole}
 
 
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Shapes (G,) of a kind that are moved one by one, with their bodies (G,), and what each is in its body's frame.
+
+    That are the `origins` (G, 3) by which Rerun moves them, and their turns as quaternions wxyz (G, 4).
+    """
+
+    shape: Shape
+    geoms: np.ndarray
+    bodies: np.ndarray
+    origins: np.ndarray
+    turns: np.ndarray
+
+    @property
+    def entity(self) -> str:
+        """Where they hang."""
+        return f"/world/fingers/{self.shape.name}"
+
+    def placed(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """World positions (T, G, 3) of origins and quaternions wxyz (T, G, 4), from those of all bodies (T, B, ...)."""
+        there, turned = positions[:, self.bodies], quaternions[:, self.bodies]
+        return there + rotation.rotate(turned, self.origins), rotation.multiply(turned, self.turns)
+
+
 @cache
-def fingers() -> Kinds:
-    """What is shown of all other bodies, which are the fingers'."""
-    return _kinds(~np.isin(dressing.dressed().geom_bodyid, list(bodies())))
+def fingers() -> tuple[Parts, ...]:
+    """What is shown of all other bodies, which are the fingers', by kind."""
+    drawn = dressing.dressed()
+    kinds = _kinds(~np.isin(drawn.geom_bodyid, list(bodies())))
+    return tuple(
+        Parts(SIMPLE[kind], geoms, drawn.geom_bodyid[geoms], origins(geoms), drawn.geom_quat[geoms])
+        for kind, geoms in kinds.items()
+    )
 
 
 def fixed(kind: int, geoms: np.ndarray) -> rr.AsComponents:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -30,5 +29,5 @@ def opened(file: Path, runs: Path) -> Path:
         wanted = [splits.load(manifest["reaches"], name) for name in splits.evaluated(manifest["reaches"])]
         for table in part.glob(f"seed*/{records.EPISODES}"):
             tables.read(table, wanted)
-        shutil.move(part, place)
+        part.replace(place)
     return place
