@@ -9,7 +9,9 @@ import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import browsing
 import forging
 import pytest
 
@@ -119,3 +121,10 @@ def submitted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def forged(submitted: Path, tmp_path: Path) -> forging.Forgery:
     """The sound bundle, taken apart."""
     return forging.taken_apart(submitted / "near.zip", tmp_path)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A headless browser; skips where there is none."""
+    with browsing.browser() as opened:
+        yield opened
