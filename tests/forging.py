@@ -17,7 +17,7 @@ import tiny
 from dextron_bench import records
 from dextron_bench.isolation.agent import Limits
 from dextron_bench.submission import bundle, contest, verification
-from dextron_bench.submission.verification import Verdict
+from dextron_bench.submission.verdict import Verdict
 
 AGENT = """
 import numpy as np

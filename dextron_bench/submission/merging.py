@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from dextron_bench import methods, provenance, publication, records
 from dextron_bench.submission import bundle
 from dextron_bench.submission.contest import BadSubmission
-from dextron_bench.submission.verification import Verdict
+from dextron_bench.submission.verdict import Verdict
 
 
 def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:

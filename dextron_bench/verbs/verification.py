@@ -14,7 +14,7 @@ import tyro
 from dextron_bench.verbs.printing import progress_bar
 
 if TYPE_CHECKING:
-    from dextron_bench.submission.verification import Verdict
+    from dextron_bench.submission.verdict import Verdict
 
 DONE, DIFFERS = 0, 1
 SHOWN = 5  # Problems of a row that are told.
