@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rerun as rr
 from test_recording import PATH, PROPERTIES, SETTING, episode
@@ -112,6 +114,19 @@ def test_a_file_that_ends_the_process_that_reads_it_is_named_and_the_rest_is_rea
     ]
     with pytest.raises(recording.BrokenRecording, match=r"deadly\.rrd: is damaged \(reading it ended"):
         recording.read_safely(deadly)
+
+
+def test_files_of_unknown_origin_are_screened_by_one_process(whole: Path, monkeypatch: pytest.MonkeyPatch):
+    started, run = [], subprocess.run
+    monkeypatch.setattr(subprocess, "run", lambda command, **told: started.append(command) or run(command, **told))
+    cut = whole.with_name("cut.rrd")
+    cut.write_bytes(whole.read_bytes()[:999])
+    first, second, third = recording.screen([whole, cut, whole])
+    assert len(started) == 1
+    for summary in (first, third):
+        assert np.array_equal(recording.read_screened(summary).episode.states, recording.read(whole).episode.states)
+    with pytest.raises(recording.BrokenRecording, match=r"cut\.rrd: is cut short"):
+        recording.read_screened(second)
 
 
 def test_a_reader_that_does_not_start_is_no_damage(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -5,7 +5,7 @@ The only package that talks to Rerun.
 
 from dextron_bench.recording.archive import BrokenRecording, Recorded, Value, read, write
 from dextron_bench.recording.pair import UnequalSettings, pair
-from dextron_bench.recording.properties import ReaderError, Summary, read_safely, summarise
+from dextron_bench.recording.properties import ReaderError, Summary, read_safely, read_screened, screen, summarise
 from dextron_bench.recording.stage import Stage, theatre
 from dextron_bench.recording.storage import UnwritableRecording
 from dextron_bench.recording.viewer import ViewerError, screenshots, view
@@ -24,6 +24,8 @@ __all__ = [
     "pair",
     "read",
     "read_safely",
+    "read_screened",
+    "screen",
     "screenshots",
     "summarise",
     "theatre",

@@ -41,20 +41,42 @@ def summarise(files: Iterable[Path], whole: bool = False) -> Iterator[Summary]:
     Only properties are read, so that a value changed elsewhere in a file goes unnoticed; unless `whole`,
     which reads everything and compares it with its digest.
     """
-    files = list(files)
-    forms = [_form(file) for file in files]
-    told = _told([file for file, wrong in zip(files, forms, strict=True) if not wrong], whole)
-    for file, wrong in zip(files, forms, strict=True):
-        yield Summary(file, damage=wrong) if wrong else _summary(file, next(told), whole)
+    for summary in _summaries(files, whole):
+        yield _compared(summary) if whole and not summary.damage else summary
+
+
+def screen(files: Iterable[Path]) -> Iterator[Summary]:
+    """Summaries of files of unknown origin, each decoded whole, in a process of its own. Raises ReaderError."""
+    return _summaries(files, whole=True)
 
 
 def read_safely(file: Path) -> Recorded:
     """The episode in a file of unknown origin; raises BrokenRecording, ReaderError."""
-    wrong = _form(file)
-    summary = Summary(file, damage=wrong) if wrong else _summary(file, next(_told([file], whole=True)), whole=False)
+    return read_screened(next(screen([file])))
+
+
+def read_screened(summary: Summary) -> Recorded:
+    """The episode in a file that `screen` summarised; raises BrokenRecording."""
     if summary.damage:
-        raise BrokenRecording(file, summary.damage)
-    return read(file)
+        raise BrokenRecording(summary.file, summary.damage)
+    return read(summary.file)
+
+
+def _summaries(files: Iterable[Path], whole: bool) -> Iterator[Summary]:
+    files = list(files)
+    forms = [_form(file) for file in files]
+    told = _told([file for file, wrong in zip(files, forms, strict=True) if not wrong], whole)
+    for file, wrong in zip(files, forms, strict=True):
+        yield Summary(file, damage=wrong) if wrong else _summary(file, next(told))
+
+
+def _compared(summary: Summary) -> Summary:
+    """The summary of a file that can be decoded, once its content is held against its digest."""
+    try:
+        read(summary.file)
+    except BrokenRecording as error:
+        return Summary(summary.file, damage=str(error).removeprefix(f"{summary.file}: "))
+    return summary
 
 
 def _form(file: Path) -> str:
@@ -94,7 +116,7 @@ def _told(files: Sequence[Path], whole: bool) -> Iterator[dict[str, Any]]:
             files = files[1:]
 
 
-def _summary(file: Path, told: dict[str, Any], whole: bool) -> Summary:
+def _summary(file: Path, told: dict[str, Any]) -> Summary:
     if "error" in told:
         return Summary(file, damage=f"is damaged ({told['error'].rpartition(f'{file}: ')[2]})")
     others = [name for name in told["applications"] if name != APPLICATION]
@@ -107,9 +129,4 @@ def _summary(file: Path, told: dict[str, Any], whole: bool) -> Summary:
         return Summary(
             file, damage=f"is a recording of another version of {APPLICATION}: it does not tell its {lacking[0]}"
         )
-    if whole:
-        try:
-            read(file)
-        except BrokenRecording as error:
-            return Summary(file, damage=str(error).removeprefix(f"{file}: "))
     return Summary(file, file.stat().st_size, properties)

@@ -35,7 +35,7 @@ class Seed:
         self._folder, self._manifest, self._seed = folder / f"seed{seed}", manifest, seed
         self._agent_files, self._wanted, self._verdict = folder / "agent", wanted, verdict
         self._traces: dict[tuple[str, int], str] = {}
-        self._recorded: dict[tuple[str, int], Path] = {}
+        self._recorded: dict[tuple[str, int], recording.Summary] = {}
         self._claimed: dict[tuple[str, int], str] = {}
         self._lenient = False
 
@@ -51,7 +51,7 @@ class Seed:
             return
         self._claimed = dict(zip(zip(table["split"], table["row"], strict=True), table["trace"], strict=True))
         self._lenient = not same_platform(result["provenance"])
-        self._recorded = {_place(file): file for file in sorted((self._folder / "recordings").glob("*.rrd"))}
+        self._recorded = self._screened(report)
         source, what = sources.open_source(self._manifest["reaches"]), f"seed {self._seed}, replaying"
         found = replaying.again(source, self._wanted, table, threads, lambda *done: report(what, *done), self._look)
         self._judge(found, result)
@@ -65,6 +65,14 @@ class Seed:
         result = records.read_result(self._folder / records.RESULT)
         bundle.check(result, "result", self._folder / records.RESULT)
         return table, result
+
+    def _screened(self, report: Report) -> dict[tuple[str, int], recording.Summary]:
+        """What the recordings say of themselves, by split and row."""
+        files, found = sorted((self._folder / "recordings").glob("*.rrd")), {}
+        for summary in recording.screen(files):
+            found[_place(summary.file)] = summary
+            report(f"seed {self._seed}, recordings", len(found), len(files))
+        return found
 
     def rerun(self, limits: Limits, threads: int, report: Report) -> None:
         """Runs the agent again and holds its episodes against those that were recorded."""
@@ -104,18 +112,19 @@ class Seed:
             **whose, "splits": computed, "provenance": told, "declared": self._manifest["declared"]
         }  # fmt: skip
         for lost in sorted(self._recorded.keys() - self._traces.keys()):
-            self._object(f"recordings/{self._recorded[lost].name} is of no row of the splits")
+            self._object(f"recordings/{self._recorded[lost].file.name} is of no row of the splits")
 
     def _look(self, split: str, row: int, episode: Episode) -> None:
         """Keeps an episode's hash, and holds its recording against it where there is one."""
         self._traces[split, row] = trace(episode)
-        if not (file := self._recorded.get((split, row))):
+        if not (summary := self._recorded.get((split, row))):
             return
         try:
-            told = recording.read_safely(file)
+            told = recording.read_screened(summary)
         except recording.BrokenRecording as error:
             self._object(str(error).replace(f"{self._folder}/", ""))
             return
+        file = summary.file
         right = {trace(episode)} | ({self._claimed[split, row]} if self._lenient else set())
         if trace(told.episode) not in right or told.episode.setting != episode.setting:
             self._object(f"recordings/{file.name} is not of the episode that its actions give")
