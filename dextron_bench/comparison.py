@@ -41,16 +41,12 @@ def compare(a: Side, b: Side) -> Comparison:
     return Comparison(
         a,
         b,
-        _difference(a.scores, b.scores),
-        _difference(*(each.astype(float) for each in solved)),
+        paired.published(a.scores, b.scores),
+        paired.published(*(each.astype(float) for each in solved)),
         flips.p_value,
         _flipped(flips, solved, rows),
         pd.DataFrame(_groups(a.scores, b.scores, rows)),
     )
-
-
-def _difference(a: np.ndarray, b: np.ndarray) -> paired.Difference:
-    return paired.difference(a, b, np.random.default_rng(0))
 
 
 def _flipped(flips: paired.Flips, solved: list[np.ndarray], rows: pd.DataFrame | None) -> pd.DataFrame:
@@ -67,7 +63,7 @@ def _groups(a: np.ndarray, b: np.ndarray, rows: pd.DataFrame | None) -> Iterator
         regions = "ring " + rows["ring"].astype(str) + ", angle " + rows["angle"].astype(str)
         groups |= {str(name): own for name, own in sorted(rows.groupby(regions).indices.items())}
     for name, own in groups.items():
-        found = _difference(a[:, own], b[:, own])
+        found = paired.published(a[:, own], b[:, own])
         means = {"a": float(a[:, own].mean()), "b": float(b[:, own].mean())}
         interval = {"difference": found.mean, "low": found.low, "high": found.high}
         yield {"group": name, "rows": len(own), **means, **interval}

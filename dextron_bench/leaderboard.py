@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -63,7 +63,8 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
     scores = {method: np.array([found["scores"] for found in seeds], float) for method, seeds in board.items()}
     settings = stats.drawn(lengths.pop(), np.random.default_rng(0))
     resamples = {method: stats.resampled(each, settings, _stream(method)) for method, each in scores.items()}
-    ranks = _ranks({method: each for method, each in scores.items() if is_entrant(method, reaches)}, resamples)
+    entrants = [method for method in scores if is_entrant(method, reaches)]
+    ranks = dict(zip(entrants, paired.ranks([scores[method] for method in entrants]), strict=True))
     regions = strata.regions(reaches, split, digest)
     ceiling = next((scores[method].mean() for method in methods.CEILINGS if method in scores), np.nan)
     for method, each in scores.items():
@@ -77,11 +78,6 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
             "regret": ceiling - each.mean(),
             **_endings(board[method]),
         }
-
-
-def _ranks(scores: Mapping[str, np.ndarray], resamples: Mapping[str, np.ndarray]) -> dict[str, int]:
-    found = paired.ranks([each.mean() for each in scores.values()], [resamples[method] for method in scores])
-    return dict(zip(scores, found, strict=True))
 
 
 def _stream(method: str) -> np.random.Generator:

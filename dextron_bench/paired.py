@@ -54,6 +54,11 @@ def difference(a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> Differ
     return Difference(found.mean, found.low, found.high, detectable(resamples))
 
 
+def published(a: np.ndarray, b: np.ndarray) -> Difference:
+    """The difference that ranks and `compare` go by: from equal scores the same interval everywhere."""
+    return difference(a, b, np.random.default_rng(0))
+
+
 def detectable(resamples: np.ndarray) -> float:
     """The smallest true difference that a test at 5 % would find with a chance of 80 %, where noise is as it was here.
 
@@ -76,22 +81,21 @@ def flips(a: np.ndarray, b: np.ndarray) -> Flips:
     return Flips(gained, lost, float(binomtest(len(gained), changed).pvalue) if changed else 1.0)
 
 
-def ranks(means: Sequence[float], resamples: Sequence[np.ndarray]) -> list[int]:
+def ranks(scores: Sequence[np.ndarray]) -> list[int]:
     """Ranks from 1, shared by methods that cannot be told from the best of their group.
 
-    From the highest mean down, a method opens a group where the interval of its paired difference from the method
-    that opened the last one does not hold 0; its rank is then its place. `resamples` are (RESAMPLES,) each, of the
-    same settings. Where means are equal, resamples decide who opens, so that the order of methods does not.
+    From the highest mean down, a method opens a group where the interval of its difference from the method that
+    opened the last one, as `published`, does not hold 0; its rank is then its place. Scores are (seeds, settings)
+    each, of the same settings. Where means are equal, scores decide who opens, so that the order of methods does not.
     """
-    order = sorted(range(len(means)), key=lambda each: (-means[each], resamples[each].tolist()))
-    found, rank, opener = [0] * len(means), 0, -1
+    order = sorted(range(len(scores)), key=lambda each: (-scores[each].mean(), scores[each].tobytes()))
+    found, rank, opener = [0] * len(scores), 0, -1
     for place, each in enumerate(order, start=1):
-        if rank == 0 or _apart(resamples[opener] - resamples[each]):
+        if rank == 0 or _apart(published(scores[opener], scores[each])):
             opener, rank = each, place
         found[each] = rank
     return found
 
 
-def _apart(resamples: np.ndarray) -> bool:
-    found = stats.interval(0.0, resamples)
+def _apart(found: Difference) -> bool:
     return found.low > 0.0 or found.high < 0.0

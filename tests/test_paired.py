@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dextron_bench import paired, stats
+from dextron_bench import paired
 
 RETURNS = st.integers(0, 20).map(float)
 ROWS = 6
@@ -107,50 +107,53 @@ def test_flips_seen_from_the_other_side_are_the_same(a: np.ndarray, b: np.ndarra
     assert 0.0 < there.p_value <= 1.0
 
 
-def around(*means: float, wide: float = 1.0) -> list[np.ndarray]:
-    """Resamples of independent methods with these means, each with a standard error of `wide`."""
-    made = np.random.default_rng(4)
-    return [made.normal(mean, wide, stats.RESAMPLES) for mean in means]
+def around(*means: float) -> list[np.ndarray]:
+    """Scores of a seed of each of some independent methods on 400 settings; each mean has a standard error of 1."""
+    made, noise = np.random.default_rng(4), np.repeat([-20.0, 20.0], 200)
+    return [mean + made.permutation(noise)[None] for mean in means]
 
 
 def test_ranks_are_shared_by_those_that_cannot_be_told_from_the_best_of_their_group():
     """Standard errors of differences are 1.4: 20 and 19 are not told apart, 20 and 14 are, 14 and 13 are not."""
-    means = [13.0, 20.0, 5.0, 19.0, 14.0]
-    assert paired.ranks(means, around(*means)) == [3, 1, 5, 1, 3]
+    assert paired.ranks(around(13.0, 20.0, 5.0, 19.0, 14.0)) == [3, 1, 5, 1, 3]
 
 
 def test_a_chain_of_neighbours_breaks_where_its_best_is_left_behind():
     """Neighbours are 2 apart, which does not show; 20 and 16 are 4 apart, which does, and 16 opens a group."""
-    assert paired.ranks([20.0, 18.0, 16.0, 14.0], around(20.0, 18.0, 16.0, 14.0)) == [1, 1, 3, 3]
+    assert paired.ranks(around(20.0, 18.0, 16.0, 14.0)) == [1, 1, 3, 3]
 
 
 def test_pairs_are_told_apart_by_the_noise_of_their_difference():
     """Alone, each is unsure by 1; a draw of settings that helps one helps the other."""
     (common,) = around(0.0)
-    assert paired.ranks([10.0, 9.9], [10.0 + common, 9.9 + common]) == [1, 2]
+    assert paired.ranks([10.0 + common, 9.9 + common]) == [1, 2]
 
 
 def test_of_equal_means_the_same_one_opens_the_group_in_any_order():
     """The third is told apart from the one that is sure, not from the one that is unsure."""
-    (noise,) = around(0.0)
-    sure, unsure, third = np.full(stats.RESAMPLES, 10.0), 10.0 + noise, np.full(stats.RESAMPLES, 9.5)
-    one, other, last = paired.ranks([10.0, 10.0, 9.5], [sure, unsure, third])
-    assert paired.ranks([10.0, 10.0, 9.5], [unsure, sure, third]) == [other, one, last]
+    (unsure,) = around(10.0)
+    sure, third = np.full((1, 400), 10.0), np.full((1, 400), 9.5)
+    one, other, last = paired.ranks([sure, unsure, third])
+    assert paired.ranks([unsure, sure, third]) == [other, one, last]
 
 
 def test_nobody_has_no_rank():
-    assert paired.ranks([], []) == []
+    assert paired.ranks([]) == []
+
+
+@settings(max_examples=25, deadline=None)
+@given(scores(2), scores(3))
+def test_two_share_a_rank_where_the_published_interval_holds_0(a: np.ndarray, b: np.ndarray):
+    found = paired.published(a, b)
+    assert (paired.ranks([a, b]) == [1, 1]) == (found.low <= 0.0 <= found.high)
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.lists(scores(2), min_size=2, max_size=5), st.randoms(use_true_random=False))
 def test_ranks_do_not_hang_on_the_order_of_methods(boards: list[np.ndarray], random):
-    drawn = stats.drawn(ROWS, rng())
-    resamples = [stats.resampled(each, drawn, np.random.default_rng(k)) for k, each in enumerate(boards)]
-    means = [float(each.mean()) for each in boards]
     order = random.sample(range(len(boards)), len(boards))
     assume(order != sorted(order))
-    found = paired.ranks(means, resamples)
-    assert paired.ranks([means[k] for k in order], [resamples[k] for k in order]) == [found[k] for k in order]
+    found = paired.ranks(boards)
+    assert paired.ranks([boards[k] for k in order]) == [found[k] for k in order]
     assert min(found) == 1
-    assert found[int(np.argmax(means))] == 1
+    assert found[int(np.argmax([each.mean() for each in boards]))] == 1
