@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
-from dextron_bench.rollout import Agent, Case
-from dextron_bench.world.setting import Source
+if TYPE_CHECKING:  # A learner's file is read by the isolated process of its agent, which may not import the world.
+    from dextron_bench.rollout import Agent, Case
+    from dextron_bench.world.setting import Source
 
 Arrays = dict[str, np.ndarray]  # Named arrays, as a safetensors file holds them.
 

@@ -83,8 +83,7 @@ class Course:
     def _over(self) -> list[tuple[int, ...]]:
         """The groups whose epochs are all done."""
         found = []
-        for folder in sorted(self._base.glob("training-*")):
-            group = training.group_of(folder)
+        for folder, group in training.groups(self._base).items():
             progress = Checkpoints(folder, group).progress()
             if progress and progress.over:
                 found.append(group)
@@ -114,8 +113,7 @@ class UnderWay:
 def under_way(runs: Path) -> list[UnderWay]:
     """The trainings below a folder of runs that are not over; raises DamagedRun."""
     found = []
-    for folder in sorted(runs.glob("*/*/training-*")):
-        group = training.group_of(folder)
+    for folder, group in training.groups(runs, "*/*/").items():
         progress = Checkpoints(folder, group).progress()
         if not progress or not progress.over:
             left = f"{progress.epochs - progress.epoch} of {progress.epochs} epochs" if progress else "all epochs"

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
 
 from dextron_bench.experts import Expert, ExpertAgent
-from dextron_bench.recording import screenshots, write
 from dextron_bench.rollout import Case, Episode, rollout
 from dextron_bench.world import appearance, model
 from dextron_bench.world.minjerk import MinjerkSource
@@ -19,7 +17,6 @@ EXPERT = Expert(gain=2.0, critical=0.15)  # Succeeds in the minimum-jerk world (
 CLOSURES = (0.0, model.HALF_CLOSED, 1.0)
 LAMPS = 24  # Places of the key light that a picture is averaged over.
 BEFORE_END = 10  # Control steps before the end at which the lift is shown.
-MOMENTS = {"reaches": 90, "closes": 215}  # Control steps of the grasp that the viewer is pictured at.
 CLEAR = (0.0, 5.0, 0.0)  # [m] where the bottle is put to show the hand alone.
 
 
@@ -35,24 +32,6 @@ def write_pictures(folder: Path) -> list[Path]:
     for name, picture in pictures.items():
         Image.fromarray(picture).save(folder / name, optimize=True)
     return [folder / name for name in pictures]
-
-
-def write_screenshots(folder: Path) -> list[Path]:
-    """Writes what Rerun's viewer shows of a grasp: reaching, closing and lifting; returns the paths.
-
-    Raises ViewerError and UnwritableRecording.
-    """
-    episode = lift()
-    path = MinjerkSource().path(episode.setting)
-    with TemporaryDirectory() as temporary:
-        file = Path(temporary) / "grasp.rrd"
-        write(file, episode, path, {"method": "exp", "reaches": "minjerk"})
-        lifted = len(episode.actions) - BEFORE_END
-        shots = {step: folder / f"recording-{name}.png" for name, step in (*MOMENTS.items(), ("lifts", lifted))}
-        screenshots(file, shots)
-    for picture in shots.values():
-        Image.open(picture).convert("RGB").quantize(256).save(picture, optimize=True)
-    return list(shots.values())
 
 
 def lift() -> Episode:

@@ -196,7 +196,7 @@ def read_json(file: Path) -> dict[str, Any]:
     """A JSON object from a file; raises DamagedRun."""
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DamagedRun(file, error) from error
     if not isinstance(found, dict):
         raise DamagedRun(file, "it holds no JSON object")

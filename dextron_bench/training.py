@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -23,6 +24,7 @@ from dextron_bench.splits import Split
 from dextron_bench.world import model
 
 TIMING = "timing.jsonl"
+NAME = re.compile(r"training-(\d+(?:\+\d+)*)", re.ASCII)  # Of the folders in which seeds train.
 RECENT = 50  # Epochs whose time tells that of the next.
 
 Report = Callable[[int, int, str], None]  # Told (epochs done, epochs in all, how it goes).
@@ -41,9 +43,10 @@ def folder_of(base: Path, seeds: Sequence[int]) -> Path:
     return base / f"training-{'+'.join(map(str, seeds))}"
 
 
-def group_of(folder: Path) -> tuple[int, ...]:
-    """The seeds that train in a folder that `folder_of` named."""
-    return tuple(map(int, folder.name.removeprefix("training-").split("+")))
+def groups(base: Path, below: str = "") -> dict[Path, tuple[int, ...]]:
+    """The folders that `folder_of` named, and the seeds that train there; `below` leads to theirs, as "*/*/"."""
+    found = {place: NAME.fullmatch(place.name) for place in sorted(base.glob(f"{below}training-*"))}
+    return {place: tuple(map(int, told[1].split("+"))) for place, told in found.items() if told}
 
 
 def train(

@@ -50,6 +50,33 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     assert "table.csv differs" in told
 
 
+def test_seeds_that_a_submission_lost_or_won_on_the_board_are_noticed(
+    submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    board = tmp_path / "board"
+    assert cli.main(["leaderboard", "add", str(submitted / "near.zip"), "--board", str(board)]) == 0
+    place = board / "results/near/synthetic"
+    shutil.copytree(place / "seed0", place / "seed2")
+    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
+    told = capsys.readouterr().out
+    assert "lies in near/synthetic/seed2, but is of near, synthetic reaches, seed 0" in told
+    assert "has seed0, seed1, seed2 where its manifest has seed0, seed1" in told
+    shutil.rmtree(place / "seed2")
+    shutil.rmtree(place / "seed1")
+    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
+    assert "has seed0 where its manifest has seed0, seed1" in capsys.readouterr().out
+
+
+def test_an_addition_that_was_cut_off_is_made_again(submitted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    board, words = tmp_path / "board", ["leaderboard", "add", str(submitted / "near.zip"), "--board"]
+    assert cli.main([*words, str(board)]) == 0
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        assert cli.main([*words, str(board), "--replace"]) == 130
+    assert cli.main([*words, str(board), "--replace"]) == 0
+    assert sorted(place.name for place in (board / "results/near").iterdir()) == ["synthetic"]
+
+
 def test_any_episode_of_a_bundle_is_recorded_where_it_is_looked_at(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
@@ -89,7 +116,17 @@ def test_a_board_of_baselines_is_run_again(submitted: Path, tmp_path: Path, caps
     assert "lies in best/synthetic/seed0, but was made by exp" in capsys.readouterr().out
     shutil.rmtree(copied.parents[1])
     file = board / "results/exp/synthetic/seed0/result.json"
-    file.write_text(file.read_text().replace("20.0", "19.0", 1))
+    sound = file.read_text()
+    told = json.loads(sound)
+    told["splits"]["test"]["causes"] = {"slipped": 3}
+    file.write_text(json.dumps(told))
+    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
+    assert "test says causes {'slipped': 3}; run again it is {'solved': " in capsys.readouterr().out
+    told["splits"]["test"]["scores"] += [20.0]
+    file.write_text(json.dumps(told))
+    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 2
+    assert "test has not one score and one hash of actions for each row" in capsys.readouterr().out
+    file.write_text(sound.replace("20.0", "19.0", 1))
     assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
     assert "says return 19; run again it is 20" in capsys.readouterr().out
     assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "none"]) == 2
@@ -99,6 +136,7 @@ def test_a_board_of_baselines_is_run_again(submitted: Path, tmp_path: Path, caps
 def test_what_cannot_be_submitted_is_said(submitted: Path, capsys: pytest.CaptureFixture[str]):
     for words, why in (
         (["--name", "a/b"], "the name 'a/b' is not one"),
+        (["--name", "a", "--memory", "0"], "--timeout and --memory are more than 0"),
         (["--name", "a", "--seed", "3"], "seeds are 0, 1, 2 and so on"),
         (["--name", "a", "--settings", "1"], "settings are a JSON object"),
         (["--name", "a", "--settings", "{"], "--settings is no JSON"),

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import stat
 import warnings
 import zipfile
 from pathlib import Path
 
 import pytest
+import tiny
 
-from dextron_bench.submission import bundle
+from dextron_bench.submission import bundle, contest
 
 
 class Unsafe:
@@ -96,6 +99,37 @@ def test_a_changed_byte_is_refused(submitted: Path, unsafe: Unsafe, tmp_path: Pa
     cut.write_bytes((submitted / "near.zip").read_bytes()[:-30])
     with pytest.raises(bundle.BadBundle, match="no whole zip file"):
         bundle.unpack(cut, tmp_path / "other")
+
+
+def test_only_what_belongs_to_the_seeds_is_packed(submitted: Path, tmp_path: Path):
+    """A write that was cut off leaves its part, and a seed that was played is not always submitted."""
+    folder = submitted / "runs" / contest.FOLDER / "near" / tiny.NAME
+    shutil.copytree(folder, tmp_path / "near")
+    (tmp_path / "near/seed0/.episodes.parquet.77.part").touch()
+    told = contest.Entry("near", f"{submitted}/near.py:Near", tiny.NAME, (0,)).told()
+    found = bundle.pack(tmp_path / "near", told, {}, tmp_path / "near.zip")["files"]
+    assert {name.split("/")[0] for name in found} == {"seed0"}
+    assert not [name for name in found if "part" in name]
+
+
+def test_an_agents_file_that_no_bundle_takes_is_told_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    file = tmp_path / "_mine.py"
+    file.touch()
+    with pytest.raises(bundle.BadBundle, match=r"a bundle has no file 'agent/_mine\.py'"):
+        bundle.check_agent({file.name: file})
+    monkeypatch.setattr(bundle, "LARGEST", -1)
+    with pytest.raises(bundle.BadBundle, match="is larger than"):
+        bundle.check_agent({"mine.py": file})
+
+
+@pytest.mark.parametrize("hours", [float("nan"), float("inf"), 10**400, -1])
+def test_a_declaration_is_a_number(hours: float, submitted: Path):
+    with zipfile.ZipFile(submitted / "near.zip") as archive:
+        manifest = json.loads(archive.read(bundle.MANIFEST))
+    bundle.check(manifest, "bundle", Path("near.zip"))
+    manifest["declared"]["hours"] = hours
+    with pytest.raises(bundle.BadBundle):
+        bundle.check(manifest, "bundle", Path("near.zip"))
 
 
 def test_a_zip_of_something_else_is_named(tmp_path: Path):

@@ -83,6 +83,11 @@ def test_installed_methods_and_what_agents_print(made: Callable[[str], str]):
     assert [episode.failure for episode in play(made(f"print('hello'); {CLOSES}"))] == [""] * 3
 
 
+def test_a_learners_file_can_be_its_agents_too(made: Callable[[str], str]):
+    (episode,) = play(made("from dextron_bench.learning import Track; return np.zeros((len(states), 1))"), CASES[:1])
+    assert episode.failure == ""
+
+
 @pytest.mark.parametrize(
     ("act", "why"),
     [
@@ -97,6 +102,11 @@ def test_installed_methods_and_what_agents_print(made: Callable[[str], str]):
         ("import socket; socket.create_connection(('127.0.0.1', 9))", "agents may not use the network"),
         ("import subprocess; subprocess.run(['ls'])", "agents may not start or signal processes"),
         ("import os; os.kill(os.getppid(), 9)", "agents may not start or signal processes"),
+        ("import sqlite3; sqlite3.connect('file:/tmp/mine?mode=rwc', uri=True)", "agents may not open databases"),
+        (
+            "import os, dextron_bench as d; os.open(d.__path__[0] + '/data', 0)",
+            "agents may not open the folder",
+        ),
         ("import gc; gc.get_objects()", "agents may not search the process"),
         ("return np.ones((1, 1, 1))", "act() must return floats of shape (2, 1)"),
         ("return np.ones((len(states), 1), int)", "it returned int64"),
@@ -209,6 +219,19 @@ def test_a_program_in_any_language_plays(tmp_path: Path):
     for episode in play(f"exec:{sys.executable} {tmp_path}/agent.py"):
         assert episode.failure == ""
         assert (episode.actions == 0.5).all()
+
+
+@pytest.mark.parametrize(
+    ("spec", "why"), [("exec:agent 'x", "is no command"), ("__main__:Agent", "is no module that agents can come from")]
+)
+def test_words_that_name_no_agent_are_told(spec: str, why: str):
+    with pytest.raises(AgentError, match=why):
+        launch(spec)
+
+
+def test_an_agent_is_given_time_and_memory():
+    with pytest.raises(AgentError, match="--timeout and --memory are more than 0"):
+        Limits(memory=-1)
 
 
 def test_a_program_that_is_not_there_is_named():

@@ -13,9 +13,9 @@ import pytest
 import tiny
 from forging import Forgery, row
 
-from dextron_bench import recording, records, splits
+from dextron_bench import provenance, recording, records, splits
 from dextron_bench.isolation.agent import Limits
-from dextron_bench.submission import contest
+from dextron_bench.submission import claims, contest, differences
 from dextron_bench.world import sources
 
 
@@ -208,6 +208,32 @@ def test_an_agent_that_cannot_be_run_again_is_told(forged: Forgery):
     assert "the bundle lacks the agent's file near.py" in forged.checked(rerun=True).problems[0]
 
 
+@pytest.mark.parametrize(
+    ("kind", "spec"),
+    [
+        ("method", "exec:/bin/sh -c id"),
+        ("code", "exec:sh"),
+        ("code", "/elsewhere/agent.py:Near"),
+        ("code", "../agent.py:Near"),
+        ("policy", "/elsewhere/policy.pt"),
+        ("policy", "../policy.onnx"),
+        ("method", "policy.pt"),
+        ("method", "unknown"),
+    ],
+)
+def test_a_manifest_starts_nothing_but_what_its_bundle_brought(
+    kind: str, spec: str, forged: Forgery, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(claims, "launch", lambda *_: pytest.fail("it was started"))
+    forged.json("bundle.json", lambda told: told["agent"].update(kind=kind, spec=spec))
+    assert f"{spec!r} names no agent of kind {kind!r}" in forged.checked(rerun=True).problems[0]
+
+
+def test_weights_are_a_file_of_the_bundle(forged: Forgery):
+    forged.json("bundle.json", lambda told: told["agent"].update(weights="../bundle.json"))
+    assert "the bundle lacks the agent's file ../bundle.json" in forged.checked(rerun=True).problems[0]
+
+
 def test_chosen_and_hidden_seeds_are_caught(forged: Forgery):
     forged.json("bundle.json", lambda told: told.update(seeds=[1]))
     problems = forged.checked().problems
@@ -222,6 +248,17 @@ def test_other_physics_is_told(forged: Forgery):
     assert forged.checked().problems == [
         "was played with other physics than this version's; submit it again with this version"
     ]
+
+
+def test_a_machine_is_of_the_same_platform_as_itself(monkeypatch: pytest.MonkeyPatch):
+    """On a Mac the name of the system has two forms."""
+    monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
+    monkeypatch.setattr("platform.system", lambda: "Darwin")
+    assert differences.same_platform(provenance.collect())
+    monkeypatch.setattr("platform.platform", lambda *_: "Linux-6.1-x86_64")
+    here = provenance.collect()
+    monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
+    assert not differences.same_platform(here)
 
 
 def test_another_platform_is_held_to_outcomes_and_says_so(forged: Forgery):

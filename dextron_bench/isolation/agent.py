@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from dataclasses import asdict, dataclass, field
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,10 @@ class Limits:
     answer: float = 10.0
     total: float = 3600.0
     memory: int = 4 * 2**30
+
+    def __post_init__(self) -> None:
+        if not min(self.start, self.answer, self.total, self.memory) > 0:
+            raise AgentError("an agent needs time and memory: --timeout and --memory are more than 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +62,7 @@ def launch(spec: str, settings: dict[str, Any] | None = None, weights: Path | No
     more = {"settings": settings or {}, "weights": file, "own": (file,) if file else ()}
     place, _, name = spec.rpartition(":")
     if spec.startswith("exec:"):
-        words = shlex.split(spec.removeprefix("exec:"))
+        words = _words(spec.removeprefix("exec:"))
         files = [str(Path(word).resolve()) for word in words if Path(word).is_file()]
         command = tuple(str(Path(word).resolve()) if Path(word).is_file() else word for word in words)
         return Launch(command=command, own=tuple(str(Path(file).parent) for file in files))
@@ -73,9 +78,23 @@ def launch(spec: str, settings: dict[str, Any] | None = None, weights: Path | No
             raise AgentError(f"there is no file {place}")
         more["own"] += (str(Path(place).resolve()),)
         return Launch(kind="code", spec=f"{Path(place).resolve()}:{name}", **more)
-    if place and (found := importlib.util.find_spec(place.partition(".")[0])):
+    if place and (found := _module(place.partition(".")[0])):
         more["own"] += tuple(found.submodule_search_locations or [found.origin or ""])
     return Launch(kind="code" if place else "method", spec=spec, **more)
+
+
+def _words(command: str) -> list[str]:
+    try:
+        return shlex.split(command)
+    except ValueError as error:
+        raise AgentError(f"exec:{command} is no command ({error})") from error
+
+
+def _module(name: str) -> ModuleSpec | None:
+    try:
+        return importlib.util.find_spec(name)
+    except ValueError as error:
+        raise AgentError(f"{name} is no module that agents can come from ({error})") from error
 
 
 class Isolated:

@@ -16,18 +16,20 @@ from dextron_bench.isolation import sandbox
 from dextron_bench.world import model
 
 PUBLIC = {  # Modules of the benchmark that agents may import, with what those need.
-    *("dextron_bench", "dextron_bench.exact", "dextron_bench.experts", "dextron_bench.tensors"),
-    *("dextron_bench.provenance", "dextron_bench.success", "dextron_bench.success.network", "dextron_bench.world"),
+    *("dextron_bench", "dextron_bench.exact", "dextron_bench.experts", "dextron_bench.learning"),
+    *("dextron_bench.provenance", "dextron_bench.tensors", "dextron_bench.world"),
+    *("dextron_bench.success", "dextron_bench.success.network"),
     *(f"dextron_bench.world.{name}" for name in ("model", "task", "rotation", "reach")),
 }
 SIMULATORS = ("mujoco", "dm_control")
 NETWORK = ("socket.connect", "socket.bind", "socket.send", "socket.getaddrinfo", "socket.gethostby")
+DATABASE = "sqlite3.connect"  # Whoever has one may attach any file to it.
 STARTING = ("subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "os.kill", "pty.")
 DIGGING = ("gc.get_", "sys._current_frames", "resource.")
 LISTING = ("os.listdir", "os.scandir")
 CHANGING = (  # Their arguments are paths, numbers, and last where there are any, folders by descriptor.
     *("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "os.mkfifo"),
-    *("os.chmod", "os.chown", "os.utime", "os.setxattr", "sqlite3.connect", "shutil.rmtree", "shutil.move"),
+    *("os.chmod", "os.chown", "os.utime", "os.setxattr", "shutil.rmtree", "shutil.move"),
 )
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 DEVICES = ("/dev/null", "/dev/urandom", "/dev/random", "/proc/cpuinfo", "/proc/meminfo", "/proc/self", "/sys/devices")
@@ -86,6 +88,8 @@ class _Guard:
             self._check_read(os.path.realpath(os.fsdecode(arguments[0])))
         elif event.startswith(NETWORK):
             raise NotForAgents(f"use the network ({event})")
+        elif event == DATABASE:
+            raise NotForAgents("open databases, which write where they like")
         elif event.startswith(STARTING):
             raise NotForAgents(f"start or signal processes ({event})")
         elif event.startswith(DIGGING):
@@ -95,6 +99,8 @@ class _Guard:
         if not _is_path(path):
             return  # A file descriptor.
         place = os.path.realpath(os.fsdecode(path))
+        if mode is None and os.path.isdir(place) and not _within(place, self._scratch):
+            raise NotForAgents(f"open the folder {place}, from which files can be opened unseen")
         if flags & WRITING and place != "/dev/null" and not _within(place, self._scratch):
             raise NotForAgents(f"write {place}: only the folder they are started in is theirs")
         self._check_read(place)

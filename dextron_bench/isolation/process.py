@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -40,7 +41,7 @@ class Process:
         )
         self._questions: queue.Queue[bytes | None] = queue.Queue()
         self._answers: queue.Queue[bytes] = queue.Queue(2)  # One that is due, and one that tells of too many.
-        self._room = room
+        self._room, self._over = room, False
         assert self._popen.stdin
         assert self._popen.stdout
         threading.Thread(target=self._write, args=(self._popen.stdin,), daemon=True).start()
@@ -48,8 +49,9 @@ class Process:
 
     def ask(self, question: bytes, seconds: float) -> bytes:
         """The line that answers; raises Silent."""
-        if not self._answers.empty() and (extra := self._answers.get()):
-            raise Silent(f"it wrote {len(extra)} bytes that nobody asked for")
+        if not self._answers.empty():
+            extra = self._answers.get()
+            raise Silent(f"it wrote {len(extra)} bytes that nobody asked for" if extra else "it ended")
         self._questions.put(question)
         try:
             line = self._answers.get(timeout=seconds)
@@ -82,12 +84,16 @@ class Process:
     def kill(self) -> None:
         """Ends the process and what it started."""
         self._questions.put(None)
+        self._over = True
         try:
             os.killpg(self._popen.pid, signal.SIGKILL)
         except (OSError, AttributeError):
             self._popen.kill()
         self._popen.wait()
         self._said.close()
+        with suppress(queue.Empty):
+            while True:  # So that the reader, which may wait for room, comes to its end.
+                self._answers.get_nowait()
 
     def _write(self, pipe: IO[bytes]) -> None:
         try:
@@ -100,11 +106,12 @@ class Process:
 
     def _read(self, pipe: IO[bytes]) -> None:
         with pipe:
-            while line := pipe.readline(self._room + 1):
+            while not self._over and (line := pipe.readline(self._room + 1)):
                 self._answers.put(line)
                 if not line.endswith(b"\n"):
                     return
-        self._answers.put(b"")
+        if not self._over:
+            self._answers.put(b"")
 
 
 def _told(code: int | None) -> str:

@@ -21,7 +21,7 @@ SECRET = (
     "synthetic",
 )  # What names of the package's data begin with that tell of settings.
 LARGEST = 256 * 2**20  # [bytes] of a file that an agent may write, what it says to stderr included.
-LIMITS = 'ulimit -c 0; ulimit -d "$1"; ulimit -f "$2"; shift 2; exec "$@"'
+LIMITS = 'ulimit -c 0; ulimit -d "$1" && ulimit -f "$2" && shift 2 && exec "$@"'
 
 
 def wrap(words: Sequence[str], scratch: str, own: Sequence[str], memory: int) -> list[str]:

@@ -85,6 +85,8 @@ def read(file: Path, sha256: str | None = None) -> Recorded:
         setting = Setting(*(facts[name] for name in Setting.__slots__))
         arrays = {name: _array(kept, name) for name in ARRAYS}
         episode = Episode(setting, **arrays, **{name: facts[name] for name in ENDS})
+    except (ValueError, TypeError) as error:
+        raise BrokenRecording(file, f"holds arrays that make no episode ({error})") from error
     except (KeyError, StopIteration) as error:
         lacking = f"it lacks {error}" if isinstance(error, KeyError) else "it lacks an array"
         raise BrokenRecording(file, f"is a recording of another version of {APPLICATION}: {lacking}") from error

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import filecmp
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from dextron_bench import methods, provenance, publication, records, rollout, run, splits, tensors, traces, weights
+from dextron_bench import methods, provenance, publication, records, rollout, run, splits, weights
 from dextron_bench.learning import Heir, Learner
 from dextron_bench.page.showreel import FOLDER
 from dextron_bench.submission import bundle, replaying, tables
@@ -93,9 +94,20 @@ def _replayed(row: Row, threads: int, report: Report) -> Finding:
     told = [row.result.get(name) for name in ("method", "reaches", "declared")]
     if told != [manifest.get(name) for name in ("name", "reaches", "declared")]:
         return Finding("", ["its name, reaches or declarations are not those that its manifest has"])
+    if problem := _misplaced(row, [f"seed{seed}" for seed in manifest.get("seeds", [])]):
+        return Finding("", [problem])
     if records.scores(found.rows) != row.result["splits"]:
         return Finding("", ["its result is not what its actions, played again, give", *found.differing[:5]])
     return Finding(f"replayed, {found.exact} of {found.episodes} episodes equal bit for bit")
+
+
+def _misplaced(row: Row, seeds: Sequence[str]) -> str:
+    """What is wrong with where a row of a submission lies; nothing where it lies among all its seeds, and no others."""
+    place, own = "/".join(row.folder.parts[-3:]), (row.result["method"], row.result["reaches"])
+    if place != "/".join((*own, f"seed{row.result['seed']}")):
+        return f"lies in {place}, but is of {row.name}"
+    there = sorted(folder.name for folder in row.folder.parent.glob("seed*"))
+    return "" if there == sorted(seeds) else f"has {', '.join(there)} where its manifest has {', '.join(seeds)}"
 
 
 def _rerun(row: Row, some: int, threads: int, report: Report) -> Finding:
@@ -106,8 +118,12 @@ def _rerun(row: Row, some: int, threads: int, report: Report) -> Finding:
             found.problems.append(f"lacks {', '.join(sorted(lacking))}")
         for name in row.result["splits"]:
             split = splits.load(row.result["reaches"], name)
-            if split.digest != row.result["splits"][name]["digest"]:
+            told = row.result["splits"][name]
+            if split.digest != told["digest"]:
                 found.problems.append(f"{name} is of another version of the split")
+                continue
+            if {len(told[each]) for each in ("scores", "actions") if each in told} != {len(split.cases)}:
+                found.problems.append(f"{name} has not one score and one hash of actions for each row of the split")
                 continue
             done += _rerun_split(row, split, _chosen(len(split.cases), some), threads, found)
             report(done, total)
@@ -122,20 +138,27 @@ def _rerun_split(row: Row, split: splits.Split, numbers: np.ndarray, threads: in
     source, cases = sources.open_source(split.reaches), [split.cases[number] for number in numbers]
     played = dict(rollout.rollout(_agent(row), source, cases, threads=threads))
     told, whole = row.result["splits"][split.name], len(numbers) == len(split.cases)
-    hashes = traces.of_actions(played[place].actions[:, 0] for place in range(len(numbers)))
-    problems = []
-    for place, number in enumerate(numbers):
-        if played[place].score != told["scores"][number]:
-            what = f"says return {told['scores'][number]:g}; run again it is {played[place].score:g}"
-            problems.append(f"{split.name} row {number}: {what}")
-        elif "actions" in told and hashes[place] != told["actions"][number]:
-            problems.append(f"{split.name} row {number}: says other actions than those of the agent, run again")
+    rows = [records.row(split, int(number), played[place]) for place, number in enumerate(numbers)]
+    made = records.scores(pd.DataFrame(rows))[split.name]
+    problems = [f"{split.name} {what}" for what in _other(told, made, numbers, whole)]
     if problems and not whole:  # Some agents, such as dice, act otherwise beside others.
         return _rerun_split(row, split, np.arange(len(split.cases)), threads, found)
     found.problems += problems
     if whole:
-        found.actions[split.name] = hashes
+        found.actions[split.name] = made["actions"]
     return len(numbers)
+
+
+def _other(told: dict[str, Any], made: dict[str, Any], numbers: np.ndarray, whole: bool) -> Iterator[str]:
+    """Where what a result says of a split is not what was made on some of its rows, or on the whole."""
+    for place, number in enumerate(numbers):
+        if told["scores"][number] != made["scores"][place]:
+            yield f"row {number}: says return {told['scores'][number]:g}; run again it is {made['scores'][place]:g}"
+        elif "actions" in told and told["actions"][number] != made["actions"][place]:
+            yield f"row {number}: says other actions than those of the agent, run again"
+    for name in ("failed", "causes", "closing_lag") if whole else ():
+        if told[name] != made[name]:
+            yield f"says {name.replace('_', ' ')} {told[name]}; run again it is {made[name]}"
 
 
 def _chosen(count: int, some: int) -> np.ndarray:
@@ -158,8 +181,9 @@ def _agent(row: Row) -> rollout.Agent:
     if isinstance(method, Heir | Learner):
         plan = run.shipped(plan, [seed])[0]
         assert plan.weights
-        if tensors.sha256(plan.weights) != row.result["training"]["sha256"]:
-            raise NothingToVerify("was made with other weights than those that ship")
+        told, true = row.result["training"], weights.about(plan.weights)
+        if other := [name for name in ("sha256", *true) if told.get(name) != true[name]]:
+            raise NothingToVerify(f"was made with other weights than those that ship: its {other[0]} is another")
     return run.agent(method, seed, plan.weights)
 
 

@@ -41,10 +41,10 @@ class BadBundle(ValueError):
 
 def pack(folder: Path, told: Mapping[str, Any], agent: Mapping[str, Path], file: Path) -> dict[str, Any]:
     """Writes the runs `seed<k>` in a folder and an agent's own files, by name, as a bundle; returns its manifest."""
-    parts = {str(found.relative_to(folder)): found for found in sorted(folder.glob("seed*/**/*")) if found.is_file()}
+    found = [file for seed in told["seeds"] for file in sorted((folder / f"seed{seed}").rglob("*"))]
+    parts = {name: file for file in found if MEMBER.fullmatch(name := str(file.relative_to(folder)))}
+    check_agent(agent)
     parts |= {f"agent/{name}": found for name, found in agent.items()}
-    for name in parts:
-        _check_name(file, name)
     hashes = {name: sha256(found) for name, found in parts.items()}
     manifest = {"format": FORMAT, **told, "files": hashes}
     check(manifest, "bundle", file)
@@ -75,7 +75,7 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
             for name, wanted in manifest["files"].items():
                 if _extract(file, archive, members[name], into / name) != wanted:
                     raise BadBundle(f"{file}: {name} is not the file whose SHA-256 the manifest has")
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, UnicodeError) as error:
         raise BadBundle(
             f"{file} is no whole zip file ({error}); make the bundle again with `dextron-bench submit`"
         ) from error
@@ -85,14 +85,22 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
 def check(value: Any, schema: str, file: Path) -> None:
     """Raises BadBundle where a JSON value is not as a shipped schema says, or holds text that cannot be written."""
     try:
-        json.dumps(value, ensure_ascii=False).encode()
-    except UnicodeEncodeError as error:
-        raise BadBundle(f"{file}: the {schema} has text that is none") from error
+        json.dumps(value, ensure_ascii=False, allow_nan=False).encode()
+    except ValueError as error:
+        raise BadBundle(f"{file}: the {schema} has text or numbers that are none ({error})") from error
     error = best_match(_schema(schema).iter_errors(value))
     if error:
         where = "/".join(map(str, error.absolute_path)) or "it"
         message = error.message if len(error.message) < 200 else f"{error.message[:200]}..."
         raise BadBundle(f"{file}: {where} in the {schema} is not as it should be: {message}")
+
+
+def check_agent(files: Mapping[str, Path]) -> None:
+    """Raises BadBundle where no bundle could hold an agent's own files, by name."""
+    for name, file in files.items():
+        _check_name(file, f"agent/{name}")
+        if file.stat().st_size > LARGEST:
+            raise BadBundle(f"{file} is larger than the {LARGEST / 2**20:.0f} MiB that a bundle takes")
 
 
 def sha256(file: Path) -> str:

@@ -110,6 +110,7 @@ def compete(
     """
     folder, source = entry.folder(runs), sources.open_source(entry.reaches)
     bundle.check({"format": bundle.FORMAT, **entry.told(), "files": {}}, "bundle", folder)
+    bundle.check_agent(entry.files())
     wanted = [splits.load(entry.reaches, name) for name in splits.evaluated(entry.reaches)]
     for seed in entry.seeds:
         place = folder / f"seed{seed}"

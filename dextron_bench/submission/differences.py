@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,7 +15,7 @@ def same_platform(told: dict[str, Any]) -> bool:
     here = provenance.collect()
     try:
         versions = told["versions"]["mujoco"] == here["versions"]["mujoco"]
-        return versions and told["machine"]["cpu"] == here["machine"]["cpu"] and _kind(told) == platform.system()
+        return versions and told["machine"]["cpu"] == here["machine"]["cpu"] and _kind(told) == _kind(here)
     except (KeyError, TypeError):
         return True  # Whoever does not say is held to the bits.
 

@@ -44,10 +44,13 @@ def merge(verdict: Verdict, board: Path) -> list[Path]:
 def _put(verdict: Verdict, board: Path) -> None:
     manifest = verdict.manifest
     place = board / publication.RESULTS / manifest["name"] / manifest["reaches"]
-    shutil.rmtree(place, ignore_errors=True)
+    part = place.with_name(f".{place.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
     for seed, result in verdict.results.items():
-        own = place / f"seed{seed}"
+        own = part / f"seed{seed}"
         own.mkdir(parents=True)
         records.store(own, verdict.tables[seed])
         provenance.write_json(own / records.RESULT, {**result, "tier": verdict.tier})
-    provenance.write_json(place / bundle.MANIFEST, manifest)  # Last: with it the row is whole.
+    provenance.write_json(part / bundle.MANIFEST, manifest)
+    shutil.rmtree(place, ignore_errors=True)
+    part.replace(place)

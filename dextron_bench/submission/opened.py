@@ -28,6 +28,7 @@ def opened(file: Path, runs: Path) -> Path:
         manifest = bundle.unpack(file, part)
         wanted = [splits.load(manifest["reaches"], name) for name in splits.evaluated(manifest["reaches"])]
         for table in part.glob(f"seed*/{records.EPISODES}"):
-            tables.read(table, wanted)
+            for fault in tables.faults(tables.read(table, wanted), wanted):
+                raise bundle.BadBundle(f"{file}: {table.parent.name}: {fault}")
         part.replace(place)
     return place

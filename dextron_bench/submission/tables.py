@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain, product
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,9 @@ FLAGS, NUMBERS = ("success", "terminated", "truncated"), (*SETTING[1:], "score",
 TEXTS, COUNTS = ("split", "digest", "reach", "failure", "cause", "trace"), ("row", "length")
 LISTS = {"actions": task.STEP_LIMIT, "final": model.STATE}  # And the most numbers of each.
 LONGEST = 1000  # Letters of a text.
+TEXT = 2**20  # [bytes] of the texts of a column in one row group, unpacked.
+GROUPS = 64  # Row groups, whose texts are read one group at a time.
+MAY_LACK = {"closing_lag"}  # Where no hand closed.
 COLUMNS = {*FLAGS, *NUMBERS, *TEXTS, *COUNTS, *LISTS}
 
 
@@ -32,7 +36,9 @@ def read(file: Path, wanted: Sequence[splits.Split]) -> pd.DataFrame:
         _check_form(file, found.schema_arrow)
         _check_size(file, found.metadata, rows)
         return _bounded(file, found)
-    except (pa.ArrowException, OverflowError) as error:
+    except KeyError as error:  # A text's column, which is asked for when the file is opened.
+        raise BadBundle(f"{file.name} should have the columns of this version; it lacks {error.args[0]!r}") from error
+    except (pa.ArrowException, OverflowError, UnicodeDecodeError) as error:
         raise BadBundle(f"{file.name} is no table that can be read ({error})") from error
 
 
@@ -64,11 +70,16 @@ def _faults(rows: pd.DataFrame, split: splits.Split) -> Iterator[str]:
 
 def _bounded(file: Path, found: pq.ParquetFile) -> pd.DataFrame:
     """The table; texts are looked at while each is held once, however many rows repeat it."""
-    for name in TEXTS:
-        for chunk in found.read(columns=[name]).column(name).chunks:
+    for group, name in product(range(found.num_row_groups), TEXTS):
+        for chunk in found.read_row_group(group, columns=[name]).column(name).chunks:
             if max((len(text or "") for text in chunk.dictionary.to_pylist()), default=0) > LONGEST:
                 raise BadBundle(f"{file.name} has texts of more than {LONGEST} letters in column {name!r}")
     table = found.read(columns=sorted(COLUMNS))
+    if empty := [name for name in sorted(COLUMNS - MAY_LACK) if table.column(name).null_count]:
+        raise BadBundle(f"{file.name} has an episode without its {empty[0]}")
+    lengths = (chunk.value_lengths().to_pylist() for chunk in table.column("final").chunks)
+    if set(chain.from_iterable(lengths)) != {model.STATE}:
+        raise BadBundle(f"{file.name} has a last state that is not {model.STATE} numbers")
     for name in TEXTS:
         plain = table.column(name).cast(pa.string())
         table = table.set_column(table.schema.get_field_index(name), name, plain)
@@ -76,7 +87,8 @@ def _bounded(file: Path, found: pq.ParquetFile) -> pd.DataFrame:
 
 
 def _check_form(file: Path, schema: pa.Schema) -> None:
-    if lacking := sorted(COLUMNS ^ set(schema.names)):
+    twice = {name for name in schema.names if schema.names.count(name) > 1}
+    if lacking := sorted(COLUMNS ^ set(schema.names) | twice):
         raise BadBundle(f"{file.name} should have the columns of this version; it differs in {lacking[0]!r}")
     tests = {
         **dict.fromkeys(FLAGS, pa.types.is_boolean),
@@ -91,12 +103,17 @@ def _check_form(file: Path, schema: pa.Schema) -> None:
 
 
 def _check_size(file: Path, told: pq.FileMetaData, rows: int) -> None:
-    """Refuses lists and texts that would fill the memory."""
+    """Refuses lists and texts that would fill the memory, by the sizes that the file tells."""
+    if told.num_row_groups > GROUPS:
+        raise BadBundle(f"{file.name} has {told.num_row_groups} row groups; {GROUPS} are plenty")
     values: dict[str, int] = dict.fromkeys(COLUMNS, 0)
     for group in range(told.num_row_groups):
         for place in range(told.num_columns):
             column = told.row_group(group).column(place)
-            values[column.path_in_schema.partition(".")[0]] += column.num_values
+            name = column.path_in_schema.partition(".")[0]
+            values[name] += column.num_values
+            if name in TEXTS and column.total_uncompressed_size > TEXT:
+                raise BadBundle(f"{file.name} has texts of {column.total_uncompressed_size} bytes in column {name!r}")
     for name, count in values.items():
         if count > rows * LISTS.get(name, 1):
             raise BadBundle(f"{file.name} has {count} values in column {name!r}, more than {rows} episodes can have")

@@ -23,7 +23,7 @@ class Eval:
 
     A method's own settings are flags too, as for `run`. Files go to `eval` below the folder of runs.
 
-    Example: dextron-bench eval --method rlil --dur 0.1 --reaches synthetic --split test
+    Example: dextron-bench eval --method rlil --dur 0.1 --preset quick --split test
     """
 
     method: str

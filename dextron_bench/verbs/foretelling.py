@@ -12,7 +12,14 @@ from dextron_bench.verbs.printing import print_json, print_table
 from dextron_bench.verbs.success import folder_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dextron_bench.rollout import Case
     from dextron_bench.success.network import SuccessModel
+
+
+class NoRows(ValueError):
+    """A wish for no row of a split."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,7 @@ class Eval:
         players = {"experts": None} | {str(policy): weights.own(policy) for policy in self.policies}
         rows = []
         for name in self.split or splits.evaluated(self.reaches):
-            cases = splits.load(self.reaches, name).cases[: self.rows]
+            cases = _first(splits.load(self.reaches, name).cases, self.rows)
             for player, agent in players.items():
                 played = cases if agent else evaluation.contrasted(cases)
                 found = evaluation.evaluate(model, source, played, agent, self.threads)
@@ -93,7 +100,7 @@ class Explain:
         from dextron_bench.world.sources import open_source
 
         model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
-        cases = splits.load(self.reaches, self.split).cases[: self.rows]
+        cases = _first(splits.load(self.reaches, self.split).cases, self.rows)
         policies = {str(policy): weights.own(policy) for policy in self.policies}
         found = explanation.choose(explanation.foreseen(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
@@ -113,6 +120,12 @@ class Explain:
         print_table("episodes", columns, cells)
         print(self.into)
         return 0
+
+
+def _first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
+    if rows < 1:
+        raise NoRows(f"--rows is how many settings of a split are played, 1 or more, not {rows}")
+    return cases[:rows]
 
 
 def chosen(file: Path | None, runs: Path, reaches: str) -> SuccessModel:
