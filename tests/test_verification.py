@@ -229,6 +229,28 @@ def test_a_manifest_starts_nothing_but_what_its_bundle_brought(
     assert f"{spec!r} names no agent of kind {kind!r}" in forged.checked(rerun=True).problems[0]
 
 
+@pytest.mark.parametrize(
+    ("kind", "spec", "weights"),
+    [
+        ("method", "reflex", ""),
+        ("method", "rlil", "seed0.safetensors"),
+        ("code", "near.py:Near", ""),
+        ("code", "baselines.reflex:Reflex", ""),
+        ("policy", "policy.pt", ""),
+        ("policy", "policy.onnx", ""),
+    ],
+)
+def test_agents_of_each_kind_are_started_from_the_bundle(kind: str, spec: str, weights: str, tmp_path: Path):
+    for name in ("near.py", "policy.pt", "policy.onnx", "seed0.safetensors"):
+        (tmp_path / name).touch()
+    told = {"kind": kind, "spec": spec, "settings": {}, "weights": weights}
+    how = claims._launch(told, tmp_path)
+    assert (how.kind, how.command) == (kind, ())
+    inside = kind == "policy" or ".py:" in spec
+    assert how.spec == (f"{tmp_path}/{spec}" if inside else spec)
+    assert how.weights == (f"{tmp_path}/{weights}" if weights else "")
+
+
 def test_weights_are_a_file_of_the_bundle(forged: Forgery):
     forged.json("bundle.json", lambda told: told["agent"].update(weights="../bundle.json"))
     assert "the bundle lacks the agent's file ../bundle.json" in forged.checked(rerun=True).problems[0]
