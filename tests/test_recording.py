@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench import recording
-from dextron_bench.recording import archive, layout, storage
+from dextron_bench.recording import archive, layout, scene, storage
 from dextron_bench.rollout import Episode
 from dextron_bench.world import model, reach, task
 from dextron_bench.world.setting import Setting
@@ -133,13 +133,28 @@ def test_a_recording_of_something_else_is_named(file: Path) -> None:
         recording.read(file)
 
 
+def chunks_of(file: Path) -> list[Chunk]:
+    return RrdReader(file).store().stream().to_chunks()
+
+
+def forge(file: Path, chunks: list[Chunk]) -> None:
+    """Writes chunks with the digest that they need."""
+    identity = archive.digest(archive.lines(chunks))
+    digest = Chunk.from_property("digest", rr.AnyValues(sha256=identity))
+    storage.save(file, [*chunks, digest], identity, layout.blueprint())
+
+
+def test_states_of_uneven_length_make_no_episode(whole: Path, file: Path) -> None:
+    kept = [each for each in chunks_of(whole) if each.entity_path not in ("/__properties/digest", "/episode/states")]
+    uneven = rr.Scalars.columns(scalars=np.zeros(7)).partition([3, 4])
+    forge(file, [*kept, Chunk.from_columns("/episode/states", scene.timelines(0, 1), uneven)])
+    with pytest.raises(recording.BrokenRecording, match="holds arrays that make no episode"):
+        recording.read(file)
+
+
 def test_a_recording_without_a_fact_is_one_of_another_version(whole: Path, file: Path) -> None:
     """Its digest is right, so that nobody damaged it."""
-    chunks = RrdReader(whole).store().stream().to_chunks()
-    kept = [chunk for chunk in chunks if not str(chunk.entity_path).startswith("/__properties")]
-    identity = archive.digest(archive.lines(kept))
-    kept.append(Chunk.from_property("digest", rr.AnyValues(sha256=identity)))
-    storage.save(file, kept, identity, layout.blueprint())
+    forge(file, [chunk for chunk in chunks_of(whole) if not chunk.entity_path.startswith("/__properties")])
     with pytest.raises(recording.BrokenRecording, match="of another version of dextron-bench: it lacks 'reach'"):
         recording.read(file)
 
