@@ -124,7 +124,7 @@ def test_it_begins_with_test_of_real_and_filters(browser: Any, table: Table):
         assert shown(opened) == ["RLIL 0.1"]
         opened.select_option("[name=tier]", "")
         opened.fill("[name=text]", "SOR")
-        assert shown(opened) == ["sor-quick"]
+        assert shown(opened) == [name for name in best if "sor" in name] != []
         opened.fill("[name=text]", "")
         opened.select_option("[name=split]", "train")
         assert shown(opened) == ["exp"]
