@@ -49,3 +49,8 @@ def test_more_row_groups_than_a_run_writes_are_refused(forged: Forgery, monkeypa
 def test_what_is_no_table_is_refused(forged: Forgery):
     (forged.seed / records.EPISODES).write_bytes(b"PAR1 nothing PAR1")
     assert "is no table that can be read" in forged.checked().problems[0]
+
+
+def test_a_text_that_would_fill_the_memory_is_refused(forged: Forgery):
+    forged.table(row(2, failure="x" * 5000))
+    assert "has texts of more than 1000 letters in column 'failure'" in forged.checked().problems[0]

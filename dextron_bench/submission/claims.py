@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from dextron_bench import methods, recording, records, splits
-from dextron_bench.isolation.agent import Launch, Limits, launch
+from dextron_bench import recording, records, splits
+from dextron_bench.isolation.agent import Limits
 from dextron_bench.rollout import AgentError, Episode
 from dextron_bench.submission import bundle, contest, replaying, tables
 from dextron_bench.submission.differences import differences, same_platform
@@ -20,10 +19,6 @@ from dextron_bench.world import sources
 
 Report = Callable[[str, int, int], None]  # Told (what, episodes done, all).
 SHOWN = 5  # Problems of a kind that are told one by one.
-
-
-CODE = re.compile(r"(?!exec:)[A-Za-z0-9][\w.+-]*:[A-Za-z_]\w*", re.ASCII)  # A file of the bundle, or a module.
-POLICY = re.compile(r"[A-Za-z0-9][\w.+-]*\.(?:pt|onnx)", re.ASCII)
 
 
 class Seed:
@@ -84,7 +79,7 @@ class Seed:
         source, told = sources.open_source(self._manifest["reaches"]), self._manifest["agent"]
         total, done, other = sum(len(split.cases) for split in self._wanted), 0, []
         try:
-            how = _launch(told, self._agent_files)
+            how = contest.launch_of(told, self._agent_files)
             for split in self._wanted:
                 for row, episode in contest.shuffled(how, source, split, self._seed, limits, threads):
                     done += 1
@@ -148,24 +143,3 @@ class Seed:
 def _place(file: Path) -> tuple[str, int]:
     split, _, row = file.stem.rpartition("-")
     return split, int(row)
-
-
-def _launch(told: dict[str, Any], files: Path) -> Launch:
-    """How to start the agent of a bundle, from its own files alone; raises BadBundle, AgentError."""
-    kind, spec = told["kind"], told["spec"]
-    if kind == "exec":
-        raise bundle.BadBundle("an agent that is a program of its own cannot be run again from its bundle")
-    if not {"method": methods.known().__contains__, "code": CODE.fullmatch, "policy": POLICY.fullmatch}[kind](spec):
-        raise bundle.BadBundle(f"{spec!r} names no agent of kind {kind!r}")
-    weights = _own(files, told["weights"]) if told["weights"] else None
-    if kind == "policy" or ".py:" in spec:
-        name, _, inside = spec.partition(":")
-        spec = ":".join([str(_own(files, name)), *([inside] if inside else [])])
-    return launch(spec, told["settings"], weights)
-
-
-def _own(files: Path, name: str) -> Path:
-    """A file that the agent brought; raises BadBundle."""
-    if Path(name).name != name or not (files / name).is_file():
-        raise bundle.BadBundle(f"the bundle lacks the agent's file {name}")
-    return files / name
