@@ -224,7 +224,8 @@ def test_a_program_in_any_language_plays(tmp_path: Path):
 @pytest.mark.parametrize(
     ("spec", "why"), [("exec:agent 'x", "is no command"), ("__main__:Agent", "is no module that agents can come from")]
 )
-def test_words_that_name_no_agent_are_told(spec: str, why: str):
+def test_words_that_name_no_agent_are_told(spec: str, why: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)  # As it is in a program that was begun by its file.
     with pytest.raises(AgentError, match=why):
         launch(spec)
 

@@ -128,7 +128,7 @@ def test_what_is_no_recording_is_named(file: Path) -> None:
 
 
 def test_a_recording_of_something_else_is_named(file: Path) -> None:
-    storage._save(file, layout.lines(), "other", layout.blueprint())
+    storage.save(file, layout.lines(), "other", layout.blueprint())
     with pytest.raises(recording.BrokenRecording, match="no digest"):
         recording.read(file)
 
@@ -166,7 +166,7 @@ def test_a_write_that_fails_leaves_what_was_there(file: Path, monkeypatch: pytes
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(storage, "_seal", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(recording.UnwritableRecording, match=r"cannot write recording .*episode\.rrd: No space left"):
         recording.write(file, episode(3), PATH, {})
     assert file.read_bytes() == before
@@ -179,7 +179,7 @@ from pathlib import Path
 from typing import Any
 sys.path.insert(0, sys.argv[1])
 import test_recording as here
-here.storage._seal = lambda file: os.kill(os.getpid(), signal.SIGKILL)
+os.fsync = lambda file: os.kill(os.getpid(), signal.SIGKILL)
 here.recording.write(Path(sys.argv[2]), here.episode(3), here.PATH, {})
 """
 
@@ -212,6 +212,15 @@ def test_rerun_switched_off_is_an_error_and_not_an_empty_file(file: Path, monkey
     with pytest.raises(recording.UnwritableRecording, match="RERUN"):
         recording.write(file, episode(2), PATH, {})
     assert os.listdir(file.parent) == []
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted where Linux tells of them")
+def test_recordings_leave_no_threads_behind(file: Path) -> None:
+    counted = []
+    for _ in range(3):
+        recording.write(file, episode(2), PATH, {})
+        counted.append(len(os.listdir("/proc/self/task")))
+    assert counted[0] == counted[1] == counted[2]
 
 
 @pytest.mark.parametrize("broken", ["states", "actions", "rewards"])

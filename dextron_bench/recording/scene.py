@@ -67,16 +67,19 @@ def poses(states: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]
     data = mujoco.MjData(physics)
     bodies, bottle = physics.nbody - 1, physics.body("bottle").id
     positions, quaternions = np.empty((len(states), bodies, 3)), np.empty((len(states), bodies, 4))
-    touched = []
+    contacts = []
     for step, qpos in enumerate(states[:, : physics.nq]):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(physics, data)
         mujoco.mj_collision(physics, data)
         positions[step], quaternions[step] = data.xpos[:bodies], data.xquat[:bodies]
-        pairs = physics.geom_bodyid[data.contact.geom]  # (C, 2); body 0 has the table.
-        held = (pairs == bottle).any(axis=1) & (pairs != 0).all(axis=1) & (data.contact.dist < 0.0)
-        touched.append(data.contact.pos[held])
-    return positions, quaternions, touched
+        contacts.append((data.contact.geom.copy(), data.contact.dist.copy(), data.contact.pos.copy()))
+    geoms, depths, points = map(np.concatenate, zip(*contacts, strict=True))
+    pairs = physics.geom_bodyid[geoms]  # (C, 2); body 0 has the table.
+    held = (pairs == bottle).any(axis=1) & (pairs != 0).all(axis=1) & (depths < 0.0)
+    steps = np.repeat(np.arange(len(states)), [len(each) for each, _, _ in contacts])
+    touched = np.bincount(steps[held], minlength=len(states))
+    return positions, quaternions, np.split(points[held], np.cumsum(touched)[:-1])
 
 
 def _entity(body: int) -> str:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterable
-from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.api import create_in_memory_blueprint
 from rerun.chunk import Chunk
-from rerun_bindings import flush_and_cleanup_orphaned_recordings
+from rerun_bindings import PyMemorySinkStorage, flush_and_cleanup_orphaned_recordings
+
+from dextron_bench import provenance
 
 APPLICATION = "dextron-bench"
 
@@ -25,38 +27,36 @@ class UnwritableRecording(OSError):
 
 def save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> str:
     """Writes chunks to `file`, whole or not at all; returns the file's SHA-256. Raises UnwritableRecording."""
-    temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        temporary.touch()
-        _save(temporary, chunks, identity, blueprint)
-        sha256 = _seal(temporary)
-        os.replace(temporary, file)
+        content = _encoded(chunks, identity, blueprint)
+        provenance.write_whole(file, lambda part: part.write_bytes(content))
     except (OSError, RuntimeError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise UnwritableRecording(file, why) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink()
-    return sha256
+    return hashlib.sha256(content).hexdigest()
 
 
-def _save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> None:
-    """Writes chunks and blueprint; raises RuntimeError where Rerun cannot or, switched off, would not."""
+def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> bytes:
+    """The bytes of an .rrd file; raises RuntimeError where Rerun, switched off, would make none.
+
+    Rerun's own way to a file makes the blueprint anew each time, and leaves two threads behind.
+    """
     recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
     try:
         if not rr.is_enabled(recording):
             raise RuntimeError("Rerun is switched off by RERUN in the environment; unset it")
-        recording.save(file, default_blueprint=blueprint)
+        memory = recording.memory_recording()
         recording.send_chunks(chunks)
+        content: bytes = memory.storage.concat_as_bytes(_prepared(blueprint))
+        memory.drain_as_bytes()  # Rerun warns of what is left in memory.
         recording.disconnect()
     finally:
         del recording
         flush_and_cleanup_orphaned_recordings()
+    return content
 
 
-def _seal(file: Path) -> str:
-    """Makes the file's bytes last; returns their SHA-256."""
-    with file.open("rb") as opened:
-        os.fsync(opened.fileno())
-        return hashlib.file_digest(opened, "sha256").hexdigest()
+@lru_cache(maxsize=2)
+def _prepared(blueprint: rrb.Blueprint) -> PyMemorySinkStorage:
+    """A blueprint as Rerun adds it to files; it holds two threads."""
+    return create_in_memory_blueprint(application_id=APPLICATION, blueprint=blueprint).storage
