@@ -37,7 +37,7 @@ class MissingMinari(ImportError):
     """Minari is an extra."""
 
     def __init__(self) -> None:
-        super().__init__("Minari is not installed; `pip install 'dextron-bench[minari]'` brings it")
+        super().__init__("Minari is not installed; `pip install 'minari[arrow]'` brings it")
 
 
 class BadExport(ValueError):

@@ -103,5 +103,5 @@ def _encoder() -> Any:
     try:
         import av
     except ImportError as error:
-        raise NoEncoder("MP4 needs PyAV: pip install 'dextron-bench[video]'; or write a .gif") from error
+        raise NoEncoder("MP4 needs PyAV: `pip install av`; or write a .gif") from error
     return av

@@ -35,7 +35,7 @@ class MissingClassifiers(ImportError):
     """scikit-learn is not installed."""
 
     def __init__(self) -> None:
-        super().__init__("the test of likeness needs scikit-learn: install dextron-bench[dev]")
+        super().__init__("the test of likeness needs scikit-learn: `pip install scikit-learn`")
 
 
 def silent() -> None:

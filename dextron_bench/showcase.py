@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -18,22 +18,24 @@ from dextron_bench.world.setting import from_frame
 EXPERTS = "exp"  # The method that plays experts.
 
 
-def choose(runs: Path, reaches: str, split: str, rows: int) -> pd.DataFrame:
+def choose(runs: Path, reaches: Sequence[str], split: str, rows: int) -> pd.DataFrame:
     """The chosen ones of the first rows of a split that runs played, each with its `name`.
 
-    Raises NothingToView, DamagedRun, MissingModel, MissingData.
+    Each method is shown on the first of the sources of reaches that it played, at its lowest seed. Raises
+    NothingToView, DamagedRun, MissingData.
     """
     table = gallery.episodes([runs])
     table = table.assign(actions=table.get("actions"))  # Runs of earlier versions kept none.
-    known = table[(table["reaches"] == reaches) & (table["split"] == split) & (table["row"] < rows)]
-    known = known[
-        (known["length"] > 0)
-        & known["actions"].notna()
-        & (known["seed"] == known.groupby("method")["seed"].transform("min"))
-    ]
+    known = table[table["reaches"].isin(reaches) & (table["split"] == split) & (table["row"] < rows)]
+    known = known[(known["length"] > 0) & known["actions"].notna()]
+    order = known["reaches"].map(reaches.index)
+    known = known[order == order.groupby(known["method"]).transform("min")]
+    known = known[known["seed"] == known.groupby("method")["seed"].transform("min")]
     if known.empty:
-        raise gallery.NothingToView(f"no run in {runs} played {split} of {reaches} reaches; `dextron-bench run` does")
-    return pd.concat([*_ends(known), *_kinds(known, reaches, split)], ignore_index=True)
+        wanted = " or ".join(reaches)
+        raise gallery.NothingToView(f"no run in {runs} played {split} of {wanted} reaches; `dextron-bench run` does")
+    cases = [case for name, own in known.groupby("reaches") for case in _kinds(own, str(name), split)]
+    return pd.concat([*_ends(known), *cases], ignore_index=True).drop_duplicates("name")
 
 
 def make(chosen: pd.DataFrame, into: Path) -> list[Path]:
@@ -53,17 +55,21 @@ def _ends(known: pd.DataFrame) -> Iterator[pd.DataFrame]:
 
 
 def _kinds(known: pd.DataFrame, reaches: str, split: str) -> Iterator[pd.DataFrame]:
-    """The clearest episode of each of the five kinds that explain the success model."""
-    for kind, seen in explanation.choose(_foreseen(known, reaches, split)).items():
+    """The clearest episode of each of the five kinds that explain the success model, where one ships."""
+    try:
+        model = network.shipped(reaches)
+    except network.MissingModel:
+        return
+    for kind, seen in explanation.choose(_foreseen(model, known, reaches, split)).items():
         method = EXPERTS if seen.player == EXPERT else seen.player
         own = known[known["method"] == method]
         mine = [setting == seen.episode.setting for setting in from_frame(own)]
         yield own[mine].head(1).assign(name=f"case-{kind}")
 
 
-def _foreseen(known: pd.DataFrame, reaches: str, split: str) -> Iterator[Foresight]:
-    """All episodes, played again, as the model that ships foretells them."""
-    model, source, cases = network.shipped(reaches), sources.open_source(reaches), splits.load(reaches, split).cases
+def _foreseen(model: network.SuccessModel, known: pd.DataFrame, reaches: str, split: str) -> Iterator[Foresight]:
+    """All episodes of methods that are no floors, played again, as a model foretells them."""
+    source, cases = sources.open_source(reaches), splits.load(reaches, split).cases
     kept = known[~known["method"].isin(methods.FLOORS)]
     for place, episode in sorted(replay(source, from_frame(kept), kept["actions"].tolist()), key=lambda each: each[0]):
         row = kept.iloc[place]

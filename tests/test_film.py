@@ -100,7 +100,7 @@ def test_an_unknown_camera_names_the_known():
 
 def test_without_an_encoder_the_line_says_how_to_get_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(NoEncoder, match=r"pip install 'dextron-bench\[video\]'; or write a \.gif"):
+    with pytest.raises(NoEncoder, match=r"`pip install av`; or write a \.gif"):
         film.mp4(tmp_path / "film.mp4", lifting(3), SMALL, lambda done, total: None)
 
 

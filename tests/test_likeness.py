@@ -155,14 +155,14 @@ def test_without_scikit_learn_the_user_is_told_what_to_do(
     reaches: list[Reach], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
-    with pytest.raises(likeness.MissingClassifiers, match=r"install dextron-bench\[dev\]"):
+    with pytest.raises(likeness.MissingClassifiers, match="pip install scikit-learn"):
         likeness.report(reaches[:4], reaches[4:8], 0)
     monkeypatch.setattr(archive, "load_reaches", lambda: reaches[:4])
     monkeypatch.setattr(likeness, "fit", None)
     assert cli.main(["data", "likeness"]) == 2
     printed = capsys.readouterr()
     assert (printed.out, printed.err.count("\n")) == ("", 1)
-    assert "install dextron-bench[dev]" in printed.err
+    assert "pip install scikit-learn" in printed.err
 
 
 @pytest.mark.parametrize("verb", ["fit", "likeness"])

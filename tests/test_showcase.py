@@ -27,7 +27,7 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_each_methods_shortest_and_each_kind_of_case(runs: Path):
-    chosen = showcase.choose(runs, "synthetic", "test", rows=100)
+    chosen = showcase.choose(runs, ["synthetic"], "test", rows=100)
     names = chosen["name"].tolist()
     assert names[:2] == ["exp-success", "nothing-failure"]
     assert "case-expert" in names
@@ -47,6 +47,18 @@ def test_from_the_command_line(runs: Path, capsys: pytest.CaptureFixture[str]):
     assert (runs.parent / "few" / "exp-success.rrd").exists()
 
 
+def test_a_method_is_shown_where_it_played_and_without_a_model_there_are_no_cases(
+    runs: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def missing(reaches: str) -> object:
+        raise network.MissingModel(reaches)
+
+    monkeypatch.setattr(network, "shipped", missing)
+    chosen = showcase.choose(runs, ["minjerk", "synthetic"], "test", rows=100)
+    assert chosen["name"].tolist() == ["exp-success", "nothing-failure"]
+    assert set(chosen["reaches"]) == {"synthetic"}
+
+
 def test_no_runs_of_the_split_is_told(runs: Path):
     with pytest.raises(gallery.NothingToView, match=r"no run in .* played open of synthetic reaches"):
-        showcase.choose(runs, "synthetic", "open", rows=100)
+        showcase.choose(runs, ["synthetic"], "open", rows=100)

@@ -57,7 +57,7 @@ def _onnx(file: Path) -> Callable[[np.ndarray], np.ndarray]:
     try:
         import onnxruntime  # pyright: ignore[reportMissingImports]
     except ModuleNotFoundError as error:
-        raise BadPolicy(f"{file} needs ONNX Runtime: pip install 'dextron-bench[onnx]'") from error
+        raise BadPolicy(f"{file} needs ONNX Runtime: `pip install onnxruntime`") from error
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     try:

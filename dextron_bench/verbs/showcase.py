@@ -16,13 +16,13 @@ class Choose:
     Of every method a success and a failure, the shortest; and of the five kinds of episodes that explain the success
     model the clearest each.
 
-    Example: dextron-bench recordings choose --reaches synthetic --into recordings
+    Example: dextron-bench recordings choose --reaches real --into recordings
     """
 
     into: Path = Path("recordings")
     """Where the recordings go."""
-    reaches: Literal["real", "synthetic", "minjerk"] = "synthetic"
-    """The source of reaches."""
+    reaches: tuple[Literal["real", "synthetic", "minjerk"], ...] = ("synthetic", "minjerk")
+    """Sources of reaches; a method is shown on the first of them that it played."""
     split: str = "test"
     """The split whose episodes are chosen from."""
     rows: int = 100
