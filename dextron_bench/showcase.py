@@ -34,7 +34,8 @@ def choose(runs: Path, reaches: Sequence[str], split: str, rows: int) -> pd.Data
     if known.empty:
         wanted = " or ".join(reaches)
         raise gallery.NothingToView(f"no run in {runs} played {split} of {wanted} reaches; `dextron-bench run` does")
-    cases = [case for name, own in known.groupby("reaches") for case in _kinds(own, str(name), split)]
+    played = [name for name in reaches if (known["reaches"] == name).any()]
+    cases = [case for name in played for case in _kinds(known[known["reaches"] == name], name, split)]
     return pd.concat([*_ends(known), *cases], ignore_index=True).drop_duplicates("name")
 
 
