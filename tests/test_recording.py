@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import stat
 import subprocess
@@ -205,6 +206,18 @@ def test_a_folder_without_leave_is_one_line(tmp_path: Path) -> None:
     tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
     with pytest.raises(recording.UnwritableRecording, match="Permission denied"):
         recording.write(tmp_path / "episode.rrd", episode(2), PATH, {})
+
+
+def test_it_opens_with_its_own_layout(whole: Path) -> None:
+    """The viewer arranges a file by itself, and badly, if it is not told which blueprint to open with."""
+    printed = subprocess.run(
+        [sys.executable, "-m", "rerun", "rrd", "print", str(whole)], capture_output=True, text=True, check=True
+    )
+    told = re.findall(r'BlueprintActivationCommand\(.*"(.+)"\), make_active: false, make_default: true', printed.stdout)
+    [layout_of] = RrdReader(whole).blueprints()
+    assert told == [layout_of.recording_id]
+    views = [str(each.entity_path) for each in RrdReader(whole).stream(store=layout_of).to_chunks()]
+    assert sum(path.startswith("/view/") and path.count("/") == 2 for path in views) == 1 + 1 + len(layout.PLOTS)
 
 
 def test_rerun_switched_off_is_an_error_and_not_an_empty_file(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,7 +23,8 @@ def test_they_are_few_and_small():
 def test_all_are_whole_and_say_whose_they_are():
     for summary in recording.summarise(FILES, whole=True):
         assert not summary.damage, summary
-        assert summary.properties["reaches"] == "synthetic"
+        own = summary.file.stem.startswith("sim")  # A world of minimum-jerk reaches.
+        assert summary.properties["reaches"] == ("minjerk" if own else "synthetic")
         assert summary.properties["physics"] == model.mjcf_hash()
         if not summary.file.stem.startswith("case-"):
             method, _, outcome = summary.file.stem.rpartition("-")
@@ -31,11 +32,11 @@ def test_all_are_whole_and_say_whose_they_are():
             assert (summary.properties["outcome"] == "success") == (outcome == "success")
 
 
-@pytest.mark.slow
-def test_their_actions_lead_to_the_same_end_again():
-    source = sources.open_source("synthetic")
-    episodes = [recording.read(file).episode for file in FILES]
+@pytest.mark.parametrize("reaches", ["synthetic", "minjerk"])
+def test_their_actions_lead_to_the_same_end_again(reaches: str):
+    recorded = [recording.read(file) for file in FILES]
+    episodes = [each.episode for each in recorded if each.properties["reaches"] == reaches]
     settings, actions = zip(*((each.setting, each.actions[:, 0]) for each in episodes), strict=True)
-    for place, again in replay(source, settings, actions):
+    for place, again in replay(sources.open_source(reaches), settings, actions):
         assert again.score == episodes[place].score
         assert len(again.actions) == len(episodes[place].actions)

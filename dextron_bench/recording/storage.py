@@ -11,7 +11,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.api import create_in_memory_blueprint
 from rerun.chunk import Chunk
-from rerun_bindings import PyMemorySinkStorage, flush_and_cleanup_orphaned_recordings
+from rerun_bindings import (
+    PyMemorySinkStorage,
+    flush_and_cleanup_orphaned_recordings,
+    new_blueprint,
+    send_blueprint,
+)
 
 from dextron_bench import provenance
 
@@ -58,5 +63,11 @@ def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -
 
 @lru_cache(maxsize=2)
 def _prepared(blueprint: rrb.Blueprint) -> PyMemorySinkStorage:
-    """A blueprint as Rerun adds it to files; it holds two threads."""
-    return create_in_memory_blueprint(application_id=APPLICATION, blueprint=blueprint).storage
+    """A blueprint, and that it is the one to open with, as Rerun adds them to files; it holds four threads."""
+    made = create_in_memory_blueprint(application_id=APPLICATION, blueprint=blueprint)
+    carrier = rr.RecordingStream._from_native(
+        new_blueprint(application_id=APPLICATION, make_default=False, make_thread_default=False, default_enabled=True)
+    )
+    kept = carrier.memory_recording()
+    send_blueprint(made.storage, make_active=False, make_default=True, recording=carrier.to_native())
+    return kept.storage
