@@ -11,6 +11,7 @@ from dextron_bench import tensors
 from dextron_bench.success import network
 from dextron_bench.success.network import GRID, SuccessModel
 from dextron_bench.world import task
+from dextron_bench.world.sources import SOURCES
 
 FILE = ".safetensors"  # What names a file, not a source of reaches.
 OPENS = -1.0  # What a hand does that is still far away, or has done nothing yet.
@@ -60,6 +61,9 @@ class Omega:
 
     def digest(self) -> str:
         """The SHA-256 of the model's file; raises NoModel, BadTensors."""
+        if not self.model.endswith(FILE) and self.model not in SOURCES:
+            known = ", ".join(SOURCES)
+            raise NoModel(f"--model takes the file of a model (*{FILE}) or one of {known}, not {self.model!r}")
         try:
             found = tensors.sha256(Path(self.model)) if self.model.endswith(FILE) else network.digest(self.model)
         except (OSError, network.MissingModel) as error:

@@ -41,7 +41,11 @@ def claim(search: dict[str, Any], folder: Path) -> None:
         provenance.write_json(file, wanted)
     found = json.loads(file.read_text(encoding="utf-8"))
     if found != wanted:
-        raise SearchMismatch(f"{folder} holds another search ({found}); choose another folder, or remove it")
+        pairs = [({**each.get("search", {}), "physics": each.get("physics")}) for each in (found, wanted)]
+        other = [name for name in pairs[0] | pairs[1] if pairs[0].get(name) != pairs[1].get(name)]
+        raise SearchMismatch(
+            f"{folder} holds another search, which differs in {', '.join(other)}; choose another folder, or remove it"
+        )
 
 
 def claimed(folder: Path) -> dict[str, Any]:

@@ -76,20 +76,22 @@ def start_points(source: Source, rows: pd.DataFrame, file: Path) -> None:
     settings = from_frame(rows)
     starts = np.array([source.path(each).positions[0, :2] for each in settings]).reshape(-1, 2)
     colours = [_colour(source.stratum(each.reach)) for each in settings]
-    figure = Figure(figsize=(6, 6), layout="constrained")
+    figure = Figure(figsize=(6, 6.5), layout="constrained")
     axes = figure.add_subplot()
     axes.scatter(*starts.T, s=3, c=colours, linewidths=0)
     axes.add_patch(Circle((0.0, 0.0), BOTTLE_RADIUS, color="tab:red", alpha=0.6))
     for angle, hue in enumerate(HUES):
         axes.scatter([], [], s=12, color=colormaps[hue](0.7), label=f"angle {angle}")
-    axes.legend(title="start regions; darker is farther", loc="lower left")
+    figure.legend(title="start regions; darker is farther", loc="outside lower center", ncols=len(HUES))
     axes.set(xlabel="x [m]", ylabel="y [m]", title=f"Starts of {len(rows)} solved {source.name} settings")
     axes.set_aspect("equal")
     _save(figure, file, 200)
 
 
-def learning_curves(curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFrame, file: Path) -> None:
-    """Draws mean and range over seeds of the return on `val` against epochs of 1,000 frames (paper, Fig. 4a).
+def learning_curves(
+    curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFrame, file: Path, epochs: str = "epochs of 1,000 frames"
+) -> None:
+    """Draws mean and range over seeds of the return on `val` against `epochs` (paper, Fig. 4a and 4c).
 
     `curves` has a table for each method and seed, with columns `epoch` and `return`. Methods among the leaderboard's
     `rows` that have none stand as a line at their return on `test`. Raises UnknownFormat, OSError.
@@ -106,7 +108,7 @@ def learning_curves(curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFra
     for place, row in enumerate(steady.to_dict("records"), start=len(curves)):
         style = ("--", ":", "-.")[place % 3]
         axes.axhline(row["return"], color=f"C{place}", linewidth=1, linestyle=style, label=f"{row['method']} (on test)")
-    axes.set(xlabel="epochs of 1,000 frames", ylabel="sum of rewards", ylim=(0.0, 20.5), xlim=(0.0, None))
+    axes.set(xlabel=epochs, ylabel="sum of rewards", ylim=(0.0, 20.5), xlim=(0.0, None))
     axes.set_title("Mean and range over seeds on 50 settings of val")
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
     _save(figure, file, 150)
@@ -129,7 +131,7 @@ def success_curve(points: list[dict[str, float]], file: Path) -> None:
 
 
 def ridges(episodes: dict[str, Foresight], file: Path) -> None:
-    """Draws what the success model thinks of every action, a curve a step, for titled episodes (paper, Fig. 5).
+    """Draws what the success model thinks of every action, some RIDGES curves an episode, for titled ones (Fig. 5).
 
     Time, as a share of the reach, goes up; a tick marks the action that was chosen. Green curves foretell the outcome,
     red ones do not. Raises UnknownFormat, OSError.

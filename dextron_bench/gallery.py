@@ -49,11 +49,20 @@ def recordings(places: Sequence[Path]) -> list[Path]:
     """The recordings at places, each a recording or a folder; raises NothingToView."""
     found: dict[Path, None] = {}
     for place in places:
-        here = [place] if place.is_file() else sorted(place.glob("**/*.rrd"))
+        if not place.exists():
+            raise NothingToView(f"there is no {place}")
+        here = [place] if place.is_file() else sorted(file for file in place.glob("**/*.rrd") if file.is_file())
         if not here:
             raise NothingToView(f"no recordings at {place}; make some with `dextron-bench run --record 3`")
         found |= dict.fromkeys(here)
     return list(found)
+
+
+def hashes(files: Sequence[Path]) -> dict[Path, str]:
+    """The SHA-256 of those recordings of which their run's manifest tells one; raises DamagedRun."""
+    manifests = {place: records.manifest(place) for place in {file.parent.parent for file in files}}
+    told = {file: manifests[file.parent.parent].get(file.name) for file in files}
+    return {file: sha256 for file, sha256 in told.items() if sha256}
 
 
 def episodes(places: Sequence[Path]) -> pd.DataFrame:

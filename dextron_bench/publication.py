@@ -83,16 +83,16 @@ def _whole(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.DataFram
     return rows.assign(**{name: [getattr(each, name) for each in told] for name in MADE})
 
 
-def learning_curves(runs: Path) -> dict[tuple[str, str], Curves]:
+def learning_curves(runs: Path, cloned: bool = False) -> dict[tuple[str, str], Curves]:
     """The learning curves of runs that live in the world, by method and source of reaches; raises DamagedRun.
 
-    What has no frames, as cloning has none, has no place on their axis.
+    What has no frames has no place on their axis: it is `cloned` from demonstrations.
     """
     found: dict[tuple[str, str], Curves] = defaultdict(dict)
     for file in sorted(runs.glob(f"*/*/seed*/{CURVE}")):
         result = records.read_result(file.with_name(records.RESULT))
         points = pd.DataFrame(records.read_json(file)["points"])
-        if result["training"]["frames"] is not None:
+        if (result["training"]["frames"] is None) == cloned:
             found[result["method"], result["reaches"]][result["seed"]] = points
     return found
 

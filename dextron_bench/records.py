@@ -126,9 +126,12 @@ def record(
     properties["physics"] = model.mjcf_hash()
     file, path = recording_file(folder, split.name, index), source.path(episode.setting)
     sha256 = recording.write(file, episode, path, properties, _insight(source, split.cases[index], episode))
-    manifest = folder / MANIFEST
-    known = read_json(manifest) if manifest.exists() else {}
-    provenance.write_json(manifest, known | {file.name: sha256})
+    provenance.write_json(folder / MANIFEST, manifest(folder) | {file.name: sha256})
+
+
+def manifest(folder: Path) -> dict[str, str]:
+    """The SHA-256 of each of a run's recordings by the file's name; raises DamagedRun."""
+    return read_json(folder / MANIFEST) if (folder / MANIFEST).exists() else {}
 
 
 def recording_file(folder: Path, split: str, index: int) -> Path:

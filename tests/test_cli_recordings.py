@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 import tiny
 from PIL import Image
+from rerun.chunk import RrdReader
 
 from dextron_bench import cli
 
@@ -62,6 +63,20 @@ def test_damaged_recordings_are_a_line_each_and_code_1(here: Path, capsys: pytes
     assert [row["return"] for row in found] == [20.0, None, None]
     assert cli.main(["recordings", "list", str(text)]) == 1
     assert capsys.readouterr().out == ""
+
+
+def test_a_run_knows_its_files_by_their_hashes(here: Path, capsys: pytest.CaptureFixture[str]):
+    """Row ids are covered by no digest, but by the SHA-256 in the run's manifest."""
+    file = Path(FOLDER) / "test-0000.rrd"
+    content = bytearray(file.read_bytes())
+    chunk = RrdReader(file).store().stream().filter(content="/episode/rewards").to_chunks()[0]
+    row_ids = chunk.to_record_batch().column("rerun.controls.RowId")
+    content[content.index(row_ids[0].as_py())] ^= 1
+    file.write_bytes(content)
+    assert cli.main(["recordings", "list"]) == 0
+    capsys.readouterr()
+    assert cli.main(["recordings", "list", "--check"]) == 1
+    assert f"{file}: is not the file whose SHA-256 was kept" in capsys.readouterr().err
 
 
 def test_a_recording_is_exported_as_a_film_and_a_table(here: Path, capsys: pytest.CaptureFixture[str]):

@@ -57,5 +57,7 @@ def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.C
 def test_what_cannot_be_is_one_line(here: Path, complaint: Callable[..., str]):
     assert "make one with `dextron-bench success data`" in complaint("success", "train", "--quiet")
     assert "No such file" in complaint("success", "data", "--policies", "none.safetensors")
+    assert "--rows and --settings are" in complaint("figures", "--settings", "0")
+    assert "--rows is how many transitions" in complaint("success", "data", "--rows", "0")
     tensors.write(here / "odd.safetensors", {"a": np.zeros(2)}, {})
     assert "does not say which method's weights" in complaint("success", "data", "--policies", "odd.safetensors")

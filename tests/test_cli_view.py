@@ -77,6 +77,23 @@ def test_files_are_printed_for_other_programs(here: Path, opened: list[str], cap
     assert [line.split("/")[1] for line in capsys.readouterr().out.splitlines()] == ["exp", "nothing"]
 
 
+def test_what_is_damaged_is_named_and_the_rest_is_opened(
+    here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main(["view", "--quiet", "--split", "test"]) == 0
+    first, *others = list(opened)
+    opened.clear()
+    content = bytearray(Path(first).read_bytes())
+    content[len(content) // 2] ^= 1
+    Path(first).write_bytes(content)
+    capsys.readouterr()
+    assert cli.main(["view", "runs"]) == 1
+    assert opened == others
+    assert capsys.readouterr().err == (
+        f"dextron-bench: {first}: is not the file whose SHA-256 was kept; it was damaged or changed after writing\n"
+    )
+
+
 def test_where_more_match_it_says_how_to_have_them(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
@@ -90,6 +107,8 @@ def test_where_more_match_it_says_how_to_have_them(
 
 def test_what_cannot_be_opened_is_one_line(here: Path, opened: list[str], complaint: Callable[..., str]):
     assert "no recordings at data" in complaint("view", "data")
+    assert "there is no nowhere" in complaint("view", "nowhere")
+    assert "is no .rrd file" in complaint("view", NOTHING + "/episodes.parquet")
     assert "no runs at data to pick episodes from" in complaint("view", "data", "--failed")
     assert "there are exp, nothing" in complaint("view", "--method", "bc")
     assert "pick 1 episode or more" in complaint("view", "--worst", "0")
@@ -133,6 +152,8 @@ def test_a_policy_at_work_is_watched(
     assert capsys.readouterr().out == "nothing on row 1 of test: 0 of 20\n"
     assert (here / "live.rrd").stat().st_size > 100_000
     assert "takes one --method" in complaint("view", "--live")
+    assert "--speed -1: it plays so many times" in complaint("view", "--live", "--method", "exp", "--speed", "-1")
+    assert "has rows 0 to 1, not 9" in complaint("view", "--live", "--method", "nothing", "--row", "9")
     assert "no weights of 'rl' ship for synthetic reaches and seed 7" in complaint(
         "view", "--live", "--method", "rl", "--seed", "7"
     )

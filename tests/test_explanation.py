@@ -43,8 +43,15 @@ def test_each_kind_finds_its_own():
 def test_the_clearer_episode_is_chosen_and_kinds_there_are_none_of_are_left_out():
     dull = seen("expert", "solved", [0.9, 0.9], [0.4, 0.4])
     assert choose([dull, EXPERT]) == {"expert": EXPERT, "wrong": dull}
-    failed = seen("expert", "too early", [0.9] * 20, [0.9] * 10 + [0.1] * 10)
+    failed = seen("expert", "too early", [0.9] * 20, [0.9] * 11 + [0.1] * 9)
     assert choose([failed]) == {"wrong": failed}  # What experts do wrong explains no policy.
+
+
+def test_an_episode_is_of_one_kind_and_a_model_that_is_mostly_right_is_not_wrong():
+    early = seen("p", "too early", [0.9] * 20, [0.9] * 15 + [0.1] * 5)  # Also foretold at a quarter of its steps.
+    assert choose([early]) == {"early": early}
+    mostly = seen("p", "too late", [0.9] * 3, [0.9, 0.1, 0.1])
+    assert choose([mostly]) == {}
 
 
 def test_a_step_is_right_where_the_outcome_is_foretold():

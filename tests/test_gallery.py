@@ -78,5 +78,8 @@ def test_recordings_are_found_at_files_and_below_folders_each_once(tmp_path: Pat
     for file in files:
         file.touch()
     assert gallery.recordings([files[0], tmp_path]) == files
+    with pytest.raises(NothingToView, match=r"there is no .*empty"):
+        gallery.recordings([tmp_path / "empty"])
+    (tmp_path / "empty" / "folder.rrd").mkdir(parents=True)
     with pytest.raises(NothingToView, match=r"no recordings at .*empty"):
         gallery.recordings([tmp_path, tmp_path / "empty"])

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 from brief import SETTINGS, SOURCE
 from rerun.chunk import RrdReader
 
 from dextron_bench import live, recording
 from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench.recording import viewer
 from dextron_bench.rollout import Case, Episode, rollout
 from dextron_bench.success.insight import Insight
 from dextron_bench.success.network import SIZES, SuccessModel
@@ -50,6 +56,22 @@ def test_every_step_is_shown_as_it_is_taken():
     np.testing.assert_array_equal(notebook.shown[-1][2].experts, episode.actions[:, 0])
     np.testing.assert_array_equal(notebook.shown[-1][2].curves, MODEL.curve(episode.states[:-1]))
     assert notebook.outcome == episode.success
+
+
+def test_a_viewer_that_is_gone_is_told_before_more_is_played(monkeypatch: pytest.MonkeyPatch):
+    @contextmanager
+    def process(arguments: list[str]) -> Iterator[subprocess.Popen[bytes]]:
+        with subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"]) as opened:
+            opened.wait()
+            yield opened
+
+    monkeypatch.setattr(viewer, "process", process)
+    monkeypatch.setattr(viewer, "address", lambda port, opened: "nowhere")
+    with recording.theatre() as (connect, wait):
+        with pytest.raises(recording.ViewerError, match=r"gone .code 3.; nothing more is played"):
+            recording.Stage(connect, "live", SOURCE.path(CASE.setting), {})
+        with pytest.raises(recording.ViewerError, match="ended with code 3"):
+            wait()
 
 
 def test_a_stage_draws_all_of_it(tmp_path: Path):

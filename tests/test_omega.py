@@ -126,6 +126,8 @@ def test_what_it_cannot_act_with_is_told(tmp_path: Path):
         Omega().made_for("minjerk")
     with pytest.raises(NoModel, match="No such file"):
         Omega(model=str(tmp_path / "none.safetensors")).made_for("real")
+    with pytest.raises(NoModel, match=r"takes the file of a model .* or one of real, synthetic.*'nofile'"):
+        Omega(model="nofile").made_for("real")
     with pytest.raises(BadRule, match="--tolerance is 2; a difference of chances lies between 0 and 1"):
         Omega(tolerance=2.0)
     with pytest.raises(BadRule, match="--near is -1"):

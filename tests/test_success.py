@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from dextron_bench.rollout import Case
 from dextron_bench.success import judgement
 from dextron_bench.success.collection import POLICY, SOLVED, UNIFORM, BadCollection, Collection, Tally, collect, draw
 from dextron_bench.success.collection import file_of as block_file
-from dextron_bench.success.dataset import Dataset, EmptyDataset
+from dextron_bench.success.dataset import BadDataset, Dataset, EmptyDataset
 from dextron_bench.success.fit import MODEL, STATE, BadFit, Fit, fit
 from dextron_bench.success.fit import network as fit_network
 from dextron_bench.success.network import GRID, SIZES, BadModel, MissingModel, SuccessModel, shipped
@@ -113,8 +114,42 @@ def test_no_data_set_and_a_damaged_one_are_told(tmp_path: Path):
     write(tmp_path, 0, [2], [1])
     file = block_file(tmp_path, 0)
     file.write_bytes(file.read_bytes()[:-40])
-    with pytest.raises(tensors.BadTensors, match=r"000000\.safetensors is damaged"):
+    with pytest.raises(BadDataset, match=r"000000\.safetensors is damaged.*; remove it, and the same .*success data"):
         Dataset(tmp_path)
+    write(tmp_path, 0, [2], [1])
+    with pytest.raises(BadDataset, match=r"all episodes .* end alike"):
+        Dataset(tmp_path)
+    write(tmp_path, 2, [2], [0])
+    with pytest.raises(BadDataset, match="lacks block 000001"):
+        Dataset(tmp_path)
+
+
+def test_blocks_that_lack_something_or_hold_nan_are_told(tmp_path: Path):
+    write(tmp_path, 0, [2, 3], [1, 0])
+    file = block_file(tmp_path, 0)
+    good = tensors.read(file)
+    tensors.write(file, {name: good[name] for name in ("states", "actions", "starts")}, {})
+    with pytest.raises(BadDataset, match="lacks 'solved'"):
+        Dataset(tmp_path)
+    tensors.write(file, good | {"starts": good["starts"][:-1]}, {})
+    with pytest.raises(BadDataset, match="has 'starts' of another length"):
+        Dataset(tmp_path)
+    good["states"][3, 7] = np.nan
+    tensors.write(file, good, {})
+    assert len(Dataset(tmp_path).take(np.array([0, 1]))[1]) == 2
+    with pytest.raises(BadDataset, match=r"000000\.safetensors holds numbers that are not finite"):
+        Dataset(tmp_path).take(np.array([3]))
+
+
+def test_a_cut_block_is_no_whole_one_and_no_rows_are_no_data_set(tmp_path: Path):
+    gather(tmp_path, 100)
+    file = block_file(tmp_path, 0)
+    file.write_bytes(file.read_bytes()[:-40])
+    with pytest.raises(BadDataset, match=r"000000.*remove it"):
+        gather(tmp_path, 100_000)
+    with pytest.raises(BadCollection, match="--rows"):
+        gather(tmp_path / "other", 0)
+    assert not (tmp_path / "other").exists()
 
 
 # Model
@@ -156,6 +191,10 @@ def test_arrays_that_make_no_model_are_told():
         SuccessModel(arrays() | {"layer.1": np.zeros(3)})
     with pytest.raises(BadModel, match="not finite"):
         SuccessModel(arrays() | {"mean": np.full(48, np.nan)})
+    with pytest.raises(BadModel, match="a deviation of states that is not above 0"):
+        SuccessModel(arrays() | {"deviation": np.zeros(48)})
+    with pytest.raises(BadModel, match=r"they hold 'adam.0.step' too; take its model\.safetensors"):
+        SuccessModel(arrays() | {"adam.0.step": np.zeros(1)})
     with pytest.raises(MissingModel, match="no success model ships for minjerk"):
         shipped("minjerk")
 
@@ -165,7 +204,7 @@ def test_arrays_that_make_no_model_are_told():
 
 def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
     for folder in ("a", "b"):
-        gather(tmp_path / folder, 300)
+        write(tmp_path / folder, 0, [30] * 10, [0, 1] * 5)
     fit(tmp_path / "a", BRIEF)
 
     def stop(done: int, wanted: int, note: str) -> None:
@@ -184,6 +223,11 @@ def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
         fit(tmp_path / "a", Fit(epochs=2, updates=4, batch=8))
     with pytest.raises(BadFit, match="positive"):
         Fit(updates=0)
+    with pytest.raises(BadFit, match="0 or more, not -1"):
+        Fit(seed=-1)
+    shutil.copyfile(tmp_path / "a" / MODEL, tmp_path / "a" / STATE)
+    with pytest.raises(tensors.BadTensors, match=r"fit\.safetensors .*no training under way"):
+        fit(tmp_path / "a", BRIEF)
 
 
 def test_the_model_is_that_of_the_epoch_with_the_lowest_loss_on_what_was_held_out(tmp_path: Path):

@@ -33,7 +33,7 @@ PLOTS = {  # Title of each plot, its lines, their range and where they are named
     "Reward": (("/episode/rewards",), (-0.1, 1.1), rrb.Corner2D.LeftTop),
 }
 ADDED = {"Action and hand closure": ("/signals/expert",), "Reward": ("/success/chance",)}  # Where success is foretold.
-FORETOLD = {"Reward": "Reward, predicted success"}
+FORETOLD = {"Reward": "Reward (yellow), predicted success (blue)"}  # Where a legend would cover them.
 DIGEST = 64  # Characters of a hash, of which the card shows eight.
 BACKGROUND = (33, 38, 45)
 
@@ -143,7 +143,7 @@ def _plot(name: str, foretold: bool) -> rrb.TimeSeriesView:
         name=name if not foretold else FORETOLD.get(name, name),
         contents=[*entities, *(ADDED.get(name, ()) if foretold else ())],
         axis_y=rrb.ScalarAxis(range=span, zoom_lock=True),
-        plot_legend=rrb.PlotLegend(corner=corner),
+        plot_legend=rrb.PlotLegend(corner=corner, visible=not (foretold and name in FORETOLD)),
     )
 
 

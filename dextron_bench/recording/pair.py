@@ -11,7 +11,7 @@ from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench.recording import layout, scene, storage
 from dextron_bench.recording.archive import Recorded
-from dextron_bench.recording.properties import read_safely
+from dextron_bench.recording.properties import PAIR, read_safely
 
 SIDES = "/a", "/b"
 PLOTS = {  # Title of each plot, what of each side is in it, and its range.
@@ -39,7 +39,7 @@ def pair(file: Path, first: Path, second: Path) -> Path:
             "`dextron-bench view --diff runs/bc/synthetic/seed0/recordings/test-0000.rrd "
             "runs/rl/synthetic/seed0/recordings/test-0000.rrd`"
         )
-    chunks = [Chunk.from_property("pair", rr.AnyValues(a=str(first), b=str(second)))]
+    chunks = [Chunk.from_property(PAIR, rr.AnyValues(a=str(first), b=str(second)))]
     for side, each in zip(SIDES, (first, second), strict=True):
         chunks += _moved(each, side)
         chunks += _lines(side)

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from dextron_bench.recording.storage import APPLICATION
 from dextron_bench.world.setting import Setting
 
 NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Told of every episode.
+PAIR = "pair"  # Property of two episodes in one file, which is for looking alone.
 MAGIC, FOOT = b"RRF2", b"FOOT"  # An .rrd file begins with the one, and has the other before its last four bytes.
 LEAST = 12  # [bytes] of an .rrd file's head.
 
@@ -27,7 +28,10 @@ class ReaderError(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """A recording's size [bytes] and properties, those of its run and its episode; or what is wrong with it."""
+    """A recording's size [bytes] and properties, those of its run and its episode; or what is wrong with it.
+
+    Of a pair, the only property tells which two recordings it shows.
+    """
 
     file: Path
     size: int = 0
@@ -35,14 +39,14 @@ class Summary:
     damage: str = ""
 
 
-def summarise(files: Iterable[Path], whole: bool = False) -> Iterator[Summary]:
+def summarise(files: Iterable[Path], whole: bool = False, hashes: Mapping[Path, str] = {}) -> Iterator[Summary]:
     """Each file's summary, in order; damage is told, not raised. Raises ReaderError.
 
     Only properties are read, so that a value changed elsewhere in a file goes unnoticed; unless `whole`,
-    which reads everything and compares it with its digest.
+    which reads everything and compares it with its digest, and with the file's SHA-256 among `hashes`.
     """
     for summary in _summaries(files, whole):
-        yield _compared(summary) if whole and not summary.damage else summary
+        yield _compared(summary, hashes.get(summary.file)) if whole and not summary.damage else summary
 
 
 def screen(files: Iterable[Path]) -> Iterator[Summary]:
@@ -70,10 +74,12 @@ def _summaries(files: Iterable[Path], whole: bool) -> Iterator[Summary]:
         yield Summary(file, damage=wrong) if wrong else _summary(file, next(told))
 
 
-def _compared(summary: Summary) -> Summary:
-    """The summary of a file that can be decoded, once its content is held against its digest."""
+def _compared(summary: Summary, sha256: str | None) -> Summary:
+    """The summary of a file that can be decoded, once its content is held against its digest; pairs have none."""
+    if PAIR in summary.properties:
+        return summary
     try:
-        read(summary.file)
+        read(summary.file, sha256)
     except BrokenRecording as error:
         return Summary(summary.file, damage=str(error).removeprefix(f"{summary.file}: "))
     return summary
@@ -124,6 +130,8 @@ def _summary(file: Path, told: dict[str, Any]) -> Summary:
         return Summary(
             file, damage=f"is no recording of {APPLICATION}, but of {', '.join(others) or 'several episodes'}"
         )
+    if PAIR in told["properties"]:
+        return Summary(file, file.stat().st_size, {PAIR: " | ".join(map(str, told["properties"][PAIR].values()))})
     properties = told["properties"].get("run", {}) | told["properties"].get("episode", {})
     if lacking := [name for name in NEEDED if name not in properties]:
         return Summary(

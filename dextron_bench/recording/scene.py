@@ -14,7 +14,6 @@ from dextron_bench.world import model, reach, task
 
 TRACE = "/world/trace"  # One leg a step; the layout shows those up to now.
 CONTACTS = "/world/contacts"
-CENTRE = "/world/palm/centre"  # The palm carries it.
 PATH_COLOUR, TRACE_COLOUR, CENTRE_COLOUR = (130, 180, 255), (255, 190, 60), (255, 90, 60)
 CONTACT_COLOUR = (230, 60, 200)
 
@@ -91,7 +90,7 @@ def props() -> list[Chunk]:
     """What does not change in the 3D view, and is the same for every episode."""
     whole = {body: [shapes.fixed(*each) for each in kinds.items()] for body, kinds in shapes.bodies().items()}
     kept = [static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, *whole.pop(0))]
-    kept.append(static(CENTRE, rr.Points3D([reach.PALM_CENTRE], radii=[0.005], colors=[CENTRE_COLOUR])))
+    whole[model.load().body("palm").id].append(rr.Points3D([reach.PALM_CENTRE], radii=[0.005], colors=[CENTRE_COLOUR]))
     kept.append(static(CONTACTS, rr.Points3D.from_fields(radii=[0.004], colors=[CONTACT_COLOUR])))
     kept.append(static(TRACE, rr.LineStrips3D.from_fields(radii=[0.002], colors=[TRACE_COLOUR])))
     kept += [static(_entity(body), *parts) for body, parts in whole.items()]

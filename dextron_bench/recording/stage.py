@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 import rerun as rr
@@ -53,12 +54,18 @@ class Stage:
 
 
 @contextmanager
-def theatre(*arguments: str) -> Iterator[tuple[Connect, Callable[[], int]]]:
+def theatre(*arguments: str) -> Iterator[tuple[Connect, Callable[[], None]]]:
     """The native viewer, reachable from this machine only: how streams reach it, and how to wait until it is closed.
 
-    Raises ViewerError.
+    Both raise ViewerError where it is gone, as does this.
     """
     port = viewer.free_port()
     with viewer.process(["--port", str(port), "--hide-welcome-screen", *arguments]) as opened:
         where = viewer.address(port, opened)
-        yield lambda stream: stream.connect_grpc(where), opened.wait
+
+        def connect(stream: rr.RecordingStream) -> None:
+            if opened.poll() is not None:
+                raise viewer.ViewerError(f"Rerun's viewer is gone (code {opened.returncode}); nothing more is played")
+            stream.connect_grpc(where)
+
+        yield connect, partial(viewer.wait, opened)

@@ -33,8 +33,13 @@ def view(files: Sequence[Path]) -> None:
     """
     _all_there(files)
     with process(["--port", "auto", *map(str, files)]) as opened:
-        if opened.wait():
-            raise ViewerError(f"Rerun's viewer ended with code {opened.returncode}; does this machine have a screen?")
+        wait(opened)
+
+
+def wait(opened: subprocess.Popen[bytes]) -> None:
+    """Waits until a viewer is closed; raises ViewerError where it ended otherwise."""
+    if opened.wait():
+        raise ViewerError(f"Rerun's viewer ended with code {opened.returncode}; does this machine have a screen?")
 
 
 def screenshots(file: Path, pictures: Mapping[int, Path], width: int = 1600, height: int = 900) -> None:

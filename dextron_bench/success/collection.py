@@ -16,7 +16,7 @@ import numpy as np
 from dextron_bench import blocks, experts, tensors
 from dextron_bench.experts import Expert, ExpertAgent
 from dextron_bench.rollout import Agent, Case, rollout
-from dextron_bench.success.dataset import HELD
+from dextron_bench.success import dataset
 from dextron_bench.world import task
 from dextron_bench.world.setting import Setting, Source
 
@@ -44,8 +44,8 @@ class Collection:
     block: int = 256
 
     def __post_init__(self) -> None:
-        if self.block < HELD or self.seed < 0:
-            raise BadCollection(f"a data set needs at least {HELD} episodes a block, and a seed of 0 or more")
+        if self.block < dataset.HELD or self.seed < 0:
+            raise BadCollection(f"a data set needs at least {dataset.HELD} episodes a block, and a seed of 0 or more")
 
     def kind(self, number: int) -> str:
         """What the episodes of a block are."""
@@ -96,9 +96,11 @@ def collect(
 ) -> dict[str, Tally]:
     """Plays blocks until there are so many rows; returns what there is of each kind.
 
-    `agents` are the policies by name. Raises SearchMismatch where the folder holds another data set, BadTensors where
-    a block is damaged, and what `rollout` does.
+    `agents` are the policies by name. Raises BadCollection, SearchMismatch where the folder holds another data set,
+    BadDataset where a block is damaged, and what `rollout` does.
     """
+    if rows < 1:
+        raise BadCollection(f"--rows is how many transitions there are to be, 1 or more, not {rows}")
     blocks.claim(asdict(collection), folder)
     tallies, number = {kind: Tally() for kind in KINDS}, 0
     while (done := sum(tally.rows for tally in tallies.values())) < rows:
@@ -119,12 +121,9 @@ def file_of(folder: Path, number: int) -> Path:
 
 
 def tally_of(file: Path) -> Tally:
-    """What a block holds; raises BadTensors, OSError."""
-    about = tensors.read_about(file)
-    try:
-        return Tally(about["rows"], about["episodes"], about["solved"])
-    except KeyError as error:
-        raise tensors.BadTensors(file, f"it does not say its {error}") from error
+    """What a block holds; raises BadDataset, OSError."""
+    found = dataset.block(file)
+    return Tally(len(found["actions"]), len(found["solved"]), int(found["solved"].sum()))
 
 
 def _play(source: Source, cases: Sequence[Case], agent: Agent, threads: int, file: Path) -> None:

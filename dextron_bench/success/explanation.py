@@ -24,6 +24,7 @@ KINDS = {
 }
 EXPERT = "expert"  # Who acts where it is no policy.
 OPEN = 0.6  # A window of hope is open where the best action has this chance at least.
+RIGHT = 0.5  # A model that is right at fewer of the steps was wrong about the episode.
 SHUT = 0.2  # It is shut where even the best has this chance at most.
 
 
@@ -78,16 +79,15 @@ def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:
 
 
 def _scores(seen: Foresight) -> dict[str, float]:
-    """How clear an episode is as each of the kinds that it can be."""
+    """How clear an episode is as the kind that it is, if it is any."""
     own, curves, chances = seen.player != EXPERT, seen.insight.curves, seen.insight.chances
-    found = {"wrong": 1.0 - seen.foretold}
-    if seen.episode.success:
-        found["policy" if own else "expert"] = seen.foretold
-    elif own and seen.diagnosis.cause == "too early":
-        found["early"] = _fall(chances)
-    elif own and (curves.max(axis=1) >= OPEN).any() and curves[-1].max() <= SHUT:
-        found["fading"] = seen.foretold * float((curves.max(axis=1) - chances).mean())
-    return found
+    if own and not seen.episode.success and seen.diagnosis.cause == "too early":
+        return {"early": _fall(chances)}
+    if own and not seen.episode.success and (curves.max(axis=1) >= OPEN).any() and curves[-1].max() <= SHUT:
+        return {"fading": seen.foretold * float((curves.max(axis=1) - chances).mean())}
+    if seen.foretold < RIGHT:
+        return {"wrong": 1.0 - seen.foretold}
+    return {"policy" if own else "expert": seen.foretold} if seen.episode.success else {}
 
 
 def _fall(chances: np.ndarray) -> float:

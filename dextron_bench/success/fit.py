@@ -45,6 +45,8 @@ class Fit:
     def __post_init__(self) -> None:
         if min(self.epochs, self.updates, self.batch, self.halved_every) < 1 or self.learning_rate <= 0.0:
             raise BadFit("epochs, updates, batch, halving and learning rate of a training are positive")
+        if self.seed < 0:
+            raise BadFit(f"the seed of a training is 0 or more, not {self.seed}")
 
 
 def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note: None) -> SuccessModel:
@@ -53,7 +55,7 @@ def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note:
     It is that of the epoch with the lowest loss on the episodes held out, since later ones learn theirs by heart and
     grow too sure. The folder then holds it, with its learning curve: losses and accuracies on both halves after each
     epoch. The same call ends with the same bytes, however often it was stopped. Raises RunMismatch, EmptyDataset,
-    BadTensors.
+    BadDataset, BadTensors.
     """
     lesson = _Lesson(folder, settings)
     file = folder / STATE
@@ -165,6 +167,8 @@ class _Lesson:
         if about.get("fit") != asdict(self._settings) or about.get("rows") != len(self._data):
             raise RunMismatch(f"{self._folder} holds another training; remove {file.name} there, or take its settings")
         self.epoch, self.curve = about["epoch"], about["curve"]
+        if lacking := [name for name in self.arrays() if f"best.{name}" not in arrays]:
+            raise tensors.BadTensors(file, f"it is no training under way: it lacks 'best.{lacking[0]}'; remove it")
         self.best = {name: arrays[f"best.{name}"] for name in self.arrays()}
         with torch.no_grad():
             for i, parameter in enumerate(self._parameters):

@@ -43,6 +43,10 @@ class SuccessModel:
                 raise BadModel(f"these arrays are no success model: {name!r} is not of shape {shape}")
             if not np.isfinite(arrays[name]).all():
                 raise BadModel(f"a success model with numbers in {name!r} that are not finite")
+        if not (np.asarray(arrays["deviation"]) > 0.0).all():
+            raise BadModel("a success model with a deviation of states that is not above 0")
+        if more := sorted(arrays.keys() - wanted.keys()):
+            raise BadModel(f"these arrays are no success model: they hold {more[0]!r} too; take its model.safetensors")
         self._mean, self._deviation = (np.asarray(arrays[name], np.float64) for name in ("mean", "deviation"))
         first, bias, *rest = (np.asarray(arrays[name], np.float64).T for name in names)
         self._of_states, self._of_action = Perceptron([(first[:-1], bias)]), first[-1]

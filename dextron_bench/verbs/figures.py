@@ -7,13 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from dextron_bench.verbs.foretelling import NoRows
+
 
 @dataclass(frozen=True)
 class Figures:
     """Draw the paper's figures 3, 4 and 5, and the README's pictures.
 
-    3: where settings that can be grasped start, and all reaches. 4: learning curves of the methods and of the success
-    model. 5: what the success model thinks in five kinds of episodes, which are played and found anew.
+    3: where settings that can be grasped start, and all reaches. 4: learning curves of the methods that live in the
+    world, of the success model, and of those that clone experts. 5: what the success model thinks in five kinds of
+    episodes, which are played and found anew.
 
     Example: dextron-bench figures --reaches synthetic --into figures
     """
@@ -23,7 +26,7 @@ class Figures:
     into: Path = Path("figures")
     """Folder for the pictures."""
     results: Path = Path("leaderboard/results")
-    """Results whose learning curves are figure 4a; where the folder is not there, it is left out."""
+    """Results whose learning curves are figures 4a and 4c; where the folder is not there, they are left out."""
     rows: int = 3000
     """Points in figure 3a at most."""
     settings: int = 100
@@ -34,6 +37,8 @@ class Figures:
     def __call__(self) -> int:
         from dextron_bench import pictures
 
+        if min(self.rows, self.settings) < 1:
+            raise NoRows("--rows and --settings are how many are drawn and played, 1 or more")
         self.into.mkdir(parents=True, exist_ok=True)
         for file in (*self._reaches(), *self._learning(), *self._success(), *pictures.write_pictures(self.into)):
             print(file)
@@ -57,12 +62,14 @@ class Figures:
     def _learning(self) -> Iterator[Path]:
         from dextron_bench import figures, leaderboard, publication, records
 
-        found = publication.learning_curves(self.results)
-        curves = {method: own for (method, reaches), own in found.items() if reaches == self.reaches}
-        if curves:
-            rows = leaderboard.table(records.results(self.results))
-            figures.learning_curves(curves, rows[rows["reaches"] == self.reaches], self._file("fig4a"))
-            yield self._file("fig4a")
+        rows = leaderboard.table(records.results(self.results)) if self.results.exists() else None
+        for name, cloned, epochs in (("fig4a", False, "epochs of 1,000 frames"), ("fig4c", True, "epochs of cloning")):
+            found = publication.learning_curves(self.results, cloned)
+            curves = {method: own for (method, reaches), own in found.items() if reaches == self.reaches}
+            if curves and rows is not None:
+                beside = rows[(rows["reaches"] == self.reaches) & (not cloned)]
+                figures.learning_curves(curves, beside, self._file(name), epochs)
+                yield self._file(name)
 
     def _success(self) -> Iterator[Path]:
         from dextron_bench import figures, splits, weights

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -57,7 +58,7 @@ class Eval:
         players = {"experts": None} | {str(policy): weights.own(policy) for policy in self.policies}
         rows = []
         for name in self.split or splits.evaluated(self.reaches):
-            cases = _first(splits.load(self.reaches, name).cases, self.rows)
+            cases = first(splits.load(self.reaches, name).cases, self.rows)
             for player, agent in players.items():
                 played = cases if agent else evaluation.contrasted(cases)
                 found = evaluation.evaluate(model, source, played, agent, self.threads)
@@ -100,16 +101,18 @@ class Explain:
         from dextron_bench.world.sources import open_source
 
         model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
-        cases = _first(splits.load(self.reaches, self.split).cases, self.rows)
+        cases = first(splits.load(self.reaches, self.split).cases, self.rows)
         policies = {str(policy): weights.own(policy) for policy in self.policies}
         found = explanation.choose(explanation.foreseen(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
         figures.ridges({explanation.KINDS[kind]: seen for kind, seen in found.items()}, self.into)
-        columns = ["kind", "player", "reach", "return", "cause", "steps foretold [%]"]
+        columns = ["kind", "player", "row", "reach", "return", "cause", "steps foretold [%]"]
+        numbers = {case.setting: row for row, case in enumerate(cases)}
         cells = [
             [
                 kind,
                 seen.player,
+                numbers[seen.episode.setting],
                 seen.episode.setting.reach,
                 seen.episode.score,
                 seen.diagnosis.cause,
@@ -118,13 +121,16 @@ class Explain:
             for kind, seen in found.items()
         ]
         print_table("episodes", columns, cells)
+        if lacking := [told for kind, told in explanation.KINDS.items() if kind not in found]:
+            print(f"dextron-bench: none of these episodes shows: {'; '.join(lacking)}", file=sys.stderr)
         print(self.into)
         return 0
 
 
-def _first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
+def first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
+    """The first so many cases; raises NoRows."""
     if rows < 1:
-        raise NoRows(f"--rows is how many settings of a split are played, 1 or more, not {rows}")
+        raise NoRows(f"how many settings of a split are played is 1 or more, not {rows}")
     return cases[:rows]
 
 
@@ -136,4 +142,8 @@ def chosen(file: Path | None, runs: Path, reaches: str) -> SuccessModel:
     own = folder_of(runs, reaches, 0) / fit.MODEL
     if file is None and not own.exists():
         return network.shipped(reaches)
-    return network.SuccessModel(tensors.read(file or own))
+    place = file or own
+    learned = tensors.read_about(place).get("data", {}).get("search", {}).get("reaches", reaches)
+    if learned != reaches:
+        print(f"dextron-bench: {place} learned from {learned} reaches, these are {reaches} ones", file=sys.stderr)
+    return network.SuccessModel(tensors.read(place))

@@ -34,14 +34,16 @@ class List:
     )
     """Folders of runs or recordings, or single recordings."""
     check: bool = False
-    """Read all of every recording, and compare it with its digest; else only properties are read."""
+    """Read all of every recording, and compare it with its digest and its run's manifest; else only properties are
+    read."""
     json: bool = False
     """Print JSON, one object for each recording."""
 
     def __call__(self) -> int:
         from dextron_bench import gallery, recording
 
-        found = list(recording.summarise(gallery.recordings(self.place), self.check))
+        files = gallery.recordings(self.place)
+        found = list(recording.summarise(files, self.check, gallery.hashes(files) if self.check else {}))
         whole = [summary for summary in found if not summary.damage]
         if self.json:
             print_json([_told(summary) for summary in found])
@@ -92,4 +94,5 @@ class Export:
 def _told(summary: Summary) -> dict[str, Any]:
     told: dict[str, Any] = {"file": str(summary.file)}
     told |= {title: summary.properties.get(name) for name, title in COLUMNS.items()}
+    told["outcome"] = "a pair" if "pair" in summary.properties else told["outcome"]
     return told | {"kB": round(summary.size / 1000), "damage": summary.damage}

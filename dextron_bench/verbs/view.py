@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from dextron_bench.gallery import Wish
 
 
+DIFFERS = 1
+
+
 @dataclass(frozen=True)
 class View:
     """Open recordings in the Rerun viewer, all together; no network is needed.
@@ -65,7 +68,7 @@ class View:
     live: bool = False
     """Watch the --method, called as on the leaderboard or as in `list`, at work with the weights that ship."""
     speed: float = 1.0
-    """How fast it plays, of real time."""
+    """How fast it plays, of real time; 0 for at once."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     print: bool = False
@@ -80,11 +83,12 @@ class View:
             return self._perform()
         places, wish = self._places(), self._wish()
         files = [self._side_by_side(places, wish)] if self.diff else self._found(places, wish)
+        whole = _whole(files)
         if self.print:
-            print(*files, sep="\n")
+            print(*whole, sep="\n")
         else:
-            recording.view(files)
-        return 0
+            recording.view(whole)
+        return 0 if len(whole) == len(files) else DIFFERS
 
     def _places(self) -> list[Path]:
         """Where to look; a submission is unpacked in the folder of runs."""
@@ -113,13 +117,15 @@ class View:
 
         if len(self.method) != 1:
             raise gallery.BadWish("--live takes one --method, such as rlil or exp")
+        if not 0.0 <= self.speed < float("inf"):
+            raise gallery.BadWish(f"--speed {self.speed:g}: it plays so many times as fast as life, or 0: at once")
         reaches = self.reaches[0] if self.reaches else "synthetic"
         label, agent = live.performer(self.method[0], reaches, self.seed[0] if self.seed else 0)
         split = splits.load(reaches, self.split[0] if self.split else "test")
         model, source = network.shipped(reaches), open_source(reaches)
+        cases = {row: split.case(row) for row in self.row or (0,)}
         with recording.theatre() as (connect, wait):
-            for row in self.row or (0,):
-                case = split.case(row)
+            for row, case in cases.items():
                 about = {"method": label, "reaches": reaches, "split": split.name, "row": row}
                 stage = recording.Stage(connect, f"{label}, {split.name} {row}", source.path(case.setting), about)
                 episode = live.play(agent, source, case, model, stage, self.speed)
@@ -147,6 +153,19 @@ class View:
             )
             print(f"dextron-bench: {told}", file=sys.stderr)
         return files
+
+
+def _whole(files: Sequence[Path]) -> list[Path]:
+    """The recordings that can be trusted; of the others a line each tells why not. Raises NothingToView."""
+    from dextron_bench import gallery, recording
+
+    found = list(recording.summarise(files, whole=True, hashes=gallery.hashes(files)))
+    damaged = [f"{summary.file}: {summary.damage}" for summary in found if summary.damage]
+    if len(damaged) == len(found):
+        raise gallery.NothingToView("; ".join(damaged))
+    for line in damaged:
+        print(f"dextron-bench: {line}", file=sys.stderr)
+    return [summary.file for summary in found if not summary.damage]
 
 
 def _tell(picked: pd.DataFrame) -> None:
