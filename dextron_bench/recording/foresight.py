@@ -18,6 +18,7 @@ RIDGES = 40  # Curves of the ridge plot, about.
 WIDTH, HEIGHT, RISE = 1.0, 5.0, 0.4  # Half the ridge plot's width, its height, and that of a curve of chance 1.
 RIGHT, WRONG, NOW, TICK = (90, 210, 140), (255, 90, 60), (255, 255, 255), (255, 190, 60)
 BARS, FRAME = (90, 150, 230), (150, 155, 165)
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # Of the reach's duration, at which the ridge plot tells the time.
 THRESHOLD = 0.5  # A chance above it foretells success.
 
 
@@ -77,12 +78,12 @@ def _look(entity: str, bars: rr.BarChart, *changing: str) -> Chunk:
 
 
 def _axis(duration: float, last: int) -> tuple[rr.LineStrips2D, rr.Points2D]:
-    """The end of the reach, and what the sides and ends of the plot are."""
-    over = -HEIGHT * duration / max(last, 1)
-    places, labels = [[-WIDTH, 0.15], [0.0, 0.15], [WIDTH, 0.15]], ["open", "action", "close"]
-    if duration <= last:
-        places, labels = [*places, [-0.6 * WIDTH, over]], [*labels, "reach ends"]
-    line = [[[-WIDTH, over], [WIDTH, over]]] if duration <= last else []
+    """What the sides of the plot are, and times as shares of the reach, with a line where it ends."""
+    there = [share for share in SHARES if share * duration <= max(last, 1)]
+    heights = [-HEIGHT * share * duration / max(last, 1) for share in there]
+    places = [[-WIDTH, 0.15], [0.0, 0.15], [WIDTH, 0.15], *([-1.12 * WIDTH, height] for height in heights)]
+    labels = ["open", "action", "close", *(f"{share:.0%}" for share in there)]
+    line = [[[-WIDTH, heights[-1]], [WIDTH, heights[-1]]]] if there[-1] == 1.0 else []
     marks = rr.Points2D(places, labels=labels, radii=[0.001], colors=[FRAME], show_labels=True)
     return rr.LineStrips2D(line, colors=[FRAME], radii=[0.006]), marks
 

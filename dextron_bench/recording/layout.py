@@ -27,13 +27,20 @@ LINES = {  # Entity of plotted lines, their names and colours.
     "/signals/expert": {"expert's action": (120, 200, 120)},
     "/success/chance": {"predicted success": (90, 150, 230), "threshold": (140, 140, 140)},
 }
-PLOTS = {  # Title of each plot, its lines, their range and where they are named.
-    "Action and hand closure": (("/episode/actions", "/signals/closure"), (-1.1, 1.1), rrb.Corner2D.RightBottom),
-    "Palm's distance, bottle's height [m]": (("/signals/metres",), (0.0, 0.7), rrb.Corner2D.RightTop),
-    "Reward": (("/episode/rewards",), (-0.1, 1.1), rrb.Corner2D.LeftTop),
+METRES = "Palm's distance, bottle's height [m]"  # The only plot with room for a legend.
+PLOTS = {  # Title of each plot, its lines and their range.
+    "Action (orange), closure (blue)": (("/episode/actions", "/signals/closure"), (-1.1, 1.1)),
+    METRES: (("/signals/metres",), (0.0, 0.7)),
+    "Reward": (("/episode/rewards",), (-0.1, 1.1)),
 }
-ADDED = {"Action and hand closure": ("/signals/expert",), "Reward": ("/success/chance",)}  # Where success is foretold.
-FORETOLD = {"Reward": "Reward (yellow), predicted success (blue)"}  # Where a legend would cover them.
+FORETOLD = {  # The same where success is foretold.
+    "Action (orange), expert's (green), closure (blue)": (
+        ("/episode/actions", "/signals/closure", "/signals/expert"),
+        (-1.1, 1.1),
+    ),
+    METRES: PLOTS[METRES],
+    "Reward (yellow), predicted success (blue)": (("/episode/rewards", "/success/chance"), (-0.1, 1.1)),
+}
 DIGEST = 64  # Characters of a hash, of which the card shows eight.
 BACKGROUND = (33, 38, 45)
 
@@ -100,7 +107,7 @@ def blueprint(foretold: bool = False, live: bool = False) -> rrb.Blueprint:
     What is `live` is shown as it comes.
     """
     text = rrb.TextDocumentView(origin="/card", name="Episode")
-    plots = [_plot(name, foretold) for name in PLOTS]
+    plots = [_plot(name, *told) for name, told in (FORETOLD if foretold else PLOTS).items()]
     told = rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3])
     if foretold:
         seen = rrb.Vertical(space(), _bars(), row_shares=[5, 2])
@@ -137,13 +144,12 @@ def space(root: str = "", name: str = "Grasp") -> rrb.Spatial3DView:
     )
 
 
-def _plot(name: str, foretold: bool) -> rrb.TimeSeriesView:
-    entities, span, corner = PLOTS[name]
+def _plot(name: str, entities: tuple[str, ...], span: tuple[float, float]) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
-        name=name if not foretold else FORETOLD.get(name, name),
-        contents=[*entities, *(ADDED.get(name, ()) if foretold else ())],
+        name=name,
+        contents=list(entities),
         axis_y=rrb.ScalarAxis(range=span, zoom_lock=True),
-        plot_legend=rrb.PlotLegend(corner=corner, visible=not (foretold and name in FORETOLD)),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=name == METRES),
     )
 
 
@@ -159,7 +165,7 @@ def _ridge() -> rrb.Spatial2DView:
     bounds = rrb.VisualBounds2D(x_range=(-1.25, 1.25), y_range=(-foresight.HEIGHT - 0.6, 0.4))
     return rrb.Spatial2DView(
         origin="/ridge",
-        name="Chances, upward",
+        name="Chances, by share of the reach",
         background=rrb.Background(color=BACKGROUND),
         visual_bounds=bounds,
     )
