@@ -151,9 +151,17 @@ def _told(verbs: Mapping[str, type[Verb] | Group], words: Sequence[str]) -> Verb
             return tyro.cli(_union(verbs), prog="dextron-bench", description=DESCRIPTION, args=words)
     except SystemExit as ended:
         if ended.code:
-            verb = " ".join(["dextron-bench", *(word for word in words[:1] if word in verbs)])
+            verb = " ".join(["dextron-bench", *_named(verbs, words)])
             print(f"dextron-bench: {settings.in_a_line(said.getvalue())}; see `{verb} --help`", file=sys.stderr)
         raise
+
+
+def _named(verbs: Mapping[str, type[Verb] | Group], words: Sequence[str]) -> list[str]:
+    """The verb that words begin with: its name, behind that of its group if it is in one."""
+    if not words or words[0] not in verbs:
+        return []
+    verb = verbs[words[0]]
+    return [words[0], *(_named(verb[1], words[1:]) if isinstance(verb, tuple) else ())]
 
 
 def _union(verbs: Mapping[str, type[Verb] | Group]) -> Any:
