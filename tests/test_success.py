@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -203,9 +204,14 @@ def test_arrays_that_make_no_model_are_told():
 
 
 def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
-    for folder in ("a", "b"):
+    for folder in ("a", "b", "c"):
         write(tmp_path / folder, 0, [30] * 10, [0, 1] * 5)
     fit(tmp_path / "a", BRIEF)
+    fit(tmp_path / "c", replace(BRIEF, epochs=1))
+    fit(tmp_path / "c", BRIEF)
+    assert contents(tmp_path / "a") == contents(tmp_path / "c")
+    with pytest.raises(records.RunMismatch, match="holds another training"):
+        fit(tmp_path / "c", replace(BRIEF, epochs=1))
 
     def stop(done: int, wanted: int, note: str) -> None:
         if done == 1:

@@ -54,8 +54,8 @@ def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note:
 
     It is that of the epoch with the lowest loss on the episodes held out, since later ones learn theirs by heart and
     grow too sure. The folder then holds it, with its learning curve: losses and accuracies on both halves after each
-    epoch. The same call ends with the same bytes, however often it was stopped. Raises RunMismatch, EmptyDataset,
-    BadDataset, BadTensors.
+    epoch. The same call ends with the same bytes, however often it was stopped, and if it had fewer epochs before.
+    Raises RunMismatch, EmptyDataset, BadDataset, BadTensors.
     """
     lesson = _Lesson(folder, settings)
     file = folder / STATE
@@ -164,7 +164,9 @@ class _Lesson:
     def resume(self, file: Path) -> None:
         """Takes the place of the training that wrote a file; raises RunMismatch, BadTensors."""
         about, arrays = tensors.read_about(file), tensors.read(file)
-        if about.get("fit") != asdict(self._settings) or about.get("rows") != len(self._data):
+        wanted = {"fit": asdict(self._settings), "rows": len(self._data)}
+        shorter = {**about.get("fit", {}), "epochs": self._settings.epochs}  # That of fewer epochs goes on.
+        if {"fit": shorter, "rows": about.get("rows")} != wanted or about["epoch"] > self._settings.epochs:
             raise RunMismatch(f"{self._folder} holds another training; remove {file.name} there, or take its settings")
         self.epoch, self.curve = about["epoch"], about["curve"]
         if lacking := [name for name in self.arrays() if f"best.{name}" not in arrays]:
