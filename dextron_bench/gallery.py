@@ -50,7 +50,7 @@ def recordings(places: Sequence[Path]) -> list[Path]:
     found: dict[Path, None] = {}
     for place in places:
         if not place.exists():
-            raise NothingToView(f"there is no {place}")
+            raise NothingToView(f"there is no {place}; `dextron-bench run --record 3` makes recordings, in runs")
         here = [place] if place.is_file() else sorted(file for file in place.glob("**/*.rrd") if file.is_file())
         if not here:
             raise NothingToView(f"no recordings at {place}; make some with `dextron-bench run --record 3`")

@@ -120,8 +120,8 @@ def test_an_agent_that_cannot_begin_is_one_line(here: Path, complaint: Callable[
         (["data", "info", "--reaches", "real"], "data import --from"),
         (["mc", "--share", "2/2", "--reaches", "synthetic"], "share 2/2 does not exist"),
         (["mc", "--seed", "-1"], "a seed of 0 or more"),
-        (["view"], "no recordings at runs"),
-        (["view", "nowhere"], "no recordings at nowhere"),
+        (["view"], "there is no runs"),
+        (["view", "nowhere"], "there is no nowhere"),
         (["splits", "--reaches", "synthetic", "--database", "no.parquet", "--into", "new"], "no.json"),
     ],
 )
