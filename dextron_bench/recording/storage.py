@@ -63,7 +63,10 @@ def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -
 
 @lru_cache(maxsize=2)
 def _prepared(blueprint: rrb.Blueprint) -> PyMemorySinkStorage:
-    """A blueprint, and that it is the one to open with, as Rerun adds them to files; it holds four threads."""
+    """A blueprint, and that it is the one to open with, as Rerun adds them to files; it holds four threads.
+
+    Rerun (0.41) has no public way to make it once for many files.
+    """
     made = create_in_memory_blueprint(application_id=APPLICATION, blueprint=blueprint)
     carrier = rr.RecordingStream._from_native(
         new_blueprint(application_id=APPLICATION, make_default=False, make_thread_default=False, default_enabled=True)
