@@ -21,6 +21,7 @@ from rerun.chunk import Chunk, RrdReader
 from dextron_bench import recording
 from dextron_bench.recording import archive, layout, scene, storage
 from dextron_bench.rollout import Episode
+from dextron_bench.success.insight import Insight
 from dextron_bench.world import model, reach, task
 from dextron_bench.world.setting import Setting
 
@@ -206,6 +207,17 @@ def test_a_folder_without_leave_is_one_line(tmp_path: Path) -> None:
     tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
     with pytest.raises(recording.UnwritableRecording, match="Permission denied"):
         recording.write(tmp_path / "episode.rrd", episode(2), PATH, {})
+
+
+def test_other_layouts_are_those_of_other_applications(tmp_path: Path) -> None:
+    """The viewer has one layout an application: that of the last file it was given."""
+    files = [tmp_path / name for name in ("plain.rrd", "foretold.rrd", "pair.rrd")]
+    recording.write(files[0], episode(2), PATH, {})
+    recording.write(files[1], episode(2), PATH, {}, Insight(np.full((2, 51), 0.5), np.zeros(2), np.zeros(2), 2.0))
+    recording.pair(files[2], *files[:2])
+    found = [RrdReader(file).recordings()[0].application_id for file in files]
+    assert found == ["dextron-bench-plain", "dextron-bench", "dextron-bench-pairs"]
+    assert [summary.damage for summary in recording.summarise(files, whole=True)] == ["", "", ""]
 
 
 def test_it_opens_with_its_own_layout(whole: Path) -> None:

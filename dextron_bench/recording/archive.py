@@ -64,7 +64,8 @@ def write(
     props, told = _props()
     identity = digest([*told, *lines(chunks)])
     chunks += [*props, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
-    return storage.save(file, chunks, identity, layout.blueprint(insight is not None))
+    application = storage.APPLICATION if insight else storage.PLAIN
+    return storage.save(file, chunks, identity, layout.blueprint(insight is not None), application)
 
 
 def read(file: Path, sha256: str | None = None) -> Recorded:

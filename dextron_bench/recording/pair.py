@@ -44,7 +44,7 @@ def pair(file: Path, first: Path, second: Path) -> Path:
         chunks += _moved(each, side)
         chunks += _lines(side)
     names = [f"{side[1:].upper()}: {_name(recorded)}" for side, recorded in zip(SIDES, sides, strict=True)]
-    storage.save(file, chunks, ", ".join(names), _blueprint(names))
+    storage.save(file, chunks, ", ".join(names), _blueprint(names), storage.PAIRS)
     return file
 
 

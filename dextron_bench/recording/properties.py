@@ -13,7 +13,7 @@ from typing import Any
 
 from dextron_bench.recording import glance
 from dextron_bench.recording.archive import ENDS, BrokenRecording, Recorded, Value, read
-from dextron_bench.recording.storage import APPLICATION
+from dextron_bench.recording.storage import APPLICATION, APPLICATIONS
 from dextron_bench.world.setting import Setting
 
 NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Told of every episode.
@@ -125,7 +125,7 @@ def _told(files: Sequence[Path], whole: bool) -> Iterator[dict[str, Any]]:
 def _summary(file: Path, told: dict[str, Any]) -> Summary:
     if "error" in told:
         return Summary(file, damage=f"is damaged ({told['error'].rpartition(f'{file}: ')[2]})")
-    others = [name for name in told["applications"] if name != APPLICATION]
+    others = [name for name in told["applications"] if name not in APPLICATIONS]
     if others or len(told["applications"]) != 1:
         return Summary(
             file, damage=f"is no recording of {APPLICATION}, but of {', '.join(others) or 'several episodes'}"

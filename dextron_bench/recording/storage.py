@@ -20,7 +20,9 @@ from rerun_bindings import (
 
 from dextron_bench import provenance
 
-APPLICATION = "dextron-bench"
+APPLICATION = "dextron-bench"  # To the viewer, recordings in which success is foretold.
+PLAIN, PAIRS = f"{APPLICATION}-plain", f"{APPLICATION}-pairs"  # Others, since it has one layout an application.
+APPLICATIONS = APPLICATION, PLAIN, PAIRS
 
 
 class UnwritableRecording(OSError):
@@ -30,10 +32,12 @@ class UnwritableRecording(OSError):
         super().__init__(f"cannot write recording {file}: {why}")
 
 
-def save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> str:
+def save(
+    file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint, application: str = APPLICATION
+) -> str:
     """Writes chunks to `file`, whole or not at all; returns the file's SHA-256. Raises UnwritableRecording."""
     try:
-        content = _encoded(chunks, identity, blueprint)
+        content = _encoded(chunks, identity, blueprint, application)
         provenance.write_whole(file, lambda part: part.write_bytes(content))
     except (OSError, RuntimeError) as error:
         why = error.strerror if isinstance(error, OSError) else error
@@ -41,18 +45,18 @@ def save(file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blue
     return hashlib.sha256(content).hexdigest()
 
 
-def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -> bytes:
+def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint, application: str) -> bytes:
     """The bytes of an .rrd file; raises RuntimeError where Rerun, switched off, would make none.
 
     Rerun's own way to a file makes the blueprint anew each time, and leaves two threads behind.
     """
-    recording = rr.RecordingStream(APPLICATION, recording_id=identity, send_properties=False)
+    recording = rr.RecordingStream(application, recording_id=identity, send_properties=False)
     try:
         if not rr.is_enabled(recording):
             raise RuntimeError("Rerun is switched off by RERUN in the environment; unset it")
         memory = recording.memory_recording()
         recording.send_chunks(chunks)
-        content: bytes = memory.storage.concat_as_bytes(_prepared(blueprint))
+        content: bytes = memory.storage.concat_as_bytes(_prepared(blueprint, application))
         memory.drain_as_bytes()  # Rerun warns of what is left in memory.
         recording.disconnect()
     finally:
@@ -62,14 +66,14 @@ def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint) -
 
 
 @lru_cache(maxsize=2)
-def _prepared(blueprint: rrb.Blueprint) -> PyMemorySinkStorage:
+def _prepared(blueprint: rrb.Blueprint, application: str) -> PyMemorySinkStorage:
     """A blueprint, and that it is the one to open with, as Rerun adds them to files; it holds four threads.
 
     Rerun (0.41) has no public way to make it once for many files.
     """
-    made = create_in_memory_blueprint(application_id=APPLICATION, blueprint=blueprint)
+    made = create_in_memory_blueprint(application_id=application, blueprint=blueprint)
     carrier = rr.RecordingStream._from_native(
-        new_blueprint(application_id=APPLICATION, make_default=False, make_thread_default=False, default_enabled=True)
+        new_blueprint(application_id=application, make_default=False, make_thread_default=False, default_enabled=True)
     )
     kept = carrier.memory_recording()
     send_blueprint(made.storage, make_active=False, make_default=True, recording=carrier.to_native())
