@@ -41,8 +41,8 @@ def claim(search: dict[str, Any], folder: Path) -> None:
         provenance.write_json(file, wanted)
     found = json.loads(file.read_text(encoding="utf-8"))
     if found != wanted:
-        pairs = [({**each.get("search", {}), "physics": each.get("physics")}) for each in (found, wanted)]
-        other = [name for name in pairs[0] | pairs[1] if pairs[0].get(name) != pairs[1].get(name)]
+        old, new = ({**each.get("search", {}), "physics": each.get("physics")} for each in (found, wanted))
+        other = [name for name in old | new if old.get(name) != new.get(name)]
         raise SearchMismatch(
             f"{folder} holds another search, which differs in {', '.join(other)}; choose another folder, or remove it"
         )

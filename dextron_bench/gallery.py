@@ -60,9 +60,9 @@ def recordings(places: Sequence[Path]) -> list[Path]:
 
 def hashes(files: Sequence[Path]) -> dict[Path, str]:
     """The SHA-256 of those recordings of which their run's manifest tells one; raises DamagedRun."""
-    manifests = {place: records.manifest(place) for place in {file.parent.parent for file in files}}
-    told = {file: manifests[file.parent.parent].get(file.name) for file in files}
-    return {file: sha256 for file, sha256 in told.items() if sha256}
+    manifests = {run: records.manifest(run) for run in {file.parent.parent for file in files}}
+    told = [(file, manifests[file.parent.parent]) for file in files]
+    return {file: manifest[file.name] for file, manifest in told if file.name in manifest}
 
 
 def episodes(places: Sequence[Path]) -> pd.DataFrame:

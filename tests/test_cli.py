@@ -142,17 +142,6 @@ def test_wrong_words_are_code_2(words: list[str], capsys: pytest.CaptureFixture[
     assert "--help" in printed.err or words[-1] in printed.err
 
 
-def test_wrong_words_point_to_the_help_of_their_own_verb(capsys: pytest.CaptureFixture[str]):
-    for words, verb in (
-        (["success", "data", "--nope"], "success data"),
-        (["success", "nope"], "success"),
-        (["nope"], ""),
-    ):
-        with pytest.raises(SystemExit):
-            cli.main(words)
-        assert capsys.readouterr().err.endswith(f"see `{f'dextron-bench {verb}'.strip()} --help`\n")
-
-
 def test_real_reaches_that_were_not_imported_are_one_line(here: Path, complaint: Callable[..., str]):
     catalogue = here / "data" / "splits.json"
     catalogue.write_text(catalogue.read_text().replace("synthetic", "real"))

@@ -61,3 +61,14 @@ def test_what_cannot_be_is_one_line(here: Path, complaint: Callable[..., str]):
     assert "--rows is how many transitions" in complaint("success", "data", "--rows", "0")
     tensors.write(here / "odd.safetensors", {"a": np.zeros(2)}, {})
     assert "does not say which method's weights" in complaint("success", "data", "--policies", "odd.safetensors")
+
+
+def test_wrong_words_point_to_the_help_of_their_own_verb(capsys: pytest.CaptureFixture[str]):
+    for words, verb in (
+        (["success", "data", "--nope"], "success data"),
+        (["success", "nope"], "success"),
+        (["nope"], ""),
+    ):
+        with pytest.raises(SystemExit):
+            cli.main(words)
+        assert capsys.readouterr().err.endswith(f"see `{f'dextron-bench {verb}'.strip()} --help`\n")

@@ -81,10 +81,11 @@ def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:
 def _scores(seen: Foresight) -> dict[str, float]:
     """How clear an episode is as the kind that it is, if it is any."""
     own, curves, chances = seen.player != EXPERT, seen.insight.curves, seen.insight.chances
-    if own and not seen.episode.success and seen.diagnosis.cause == "too early":
-        return {"early": _fall(chances)}
-    if own and not seen.episode.success and (curves.max(axis=1) >= OPEN).any() and curves[-1].max() <= SHUT:
-        return {"fading": seen.foretold * float((curves.max(axis=1) - chances).mean())}
+    if own and not seen.episode.success:  # What experts do wrong explains no policy.
+        if seen.diagnosis.cause == "too early":
+            return {"early": _fall(chances)}
+        if (curves.max(axis=1) >= OPEN).any() and curves[-1].max() <= SHUT:
+            return {"fading": seen.foretold * float((curves.max(axis=1) - chances).mean())}
     if seen.foretold < RIGHT:
         return {"wrong": 1.0 - seen.foretold}
     return {"policy" if own else "expert": seen.foretold} if seen.episode.success else {}

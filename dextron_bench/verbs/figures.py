@@ -67,8 +67,8 @@ class Figures:
             found = publication.learning_curves(self.results, cloned)
             curves = {method: own for (method, reaches), own in found.items() if reaches == self.reaches}
             if curves and rows is not None:
-                beside = rows[(rows["reaches"] == self.reaches) & (not cloned)]
-                figures.learning_curves(curves, beside, self._file(name), epochs)
+                own = rows[rows["reaches"] == self.reaches]
+                figures.learning_curves(curves, own.head(0) if cloned else own, self._file(name), epochs)
                 yield self._file(name)
 
     def _success(self) -> Iterator[Path]:

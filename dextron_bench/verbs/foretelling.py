@@ -58,7 +58,7 @@ class Eval:
         players = {"experts": None} | {str(policy): weights.own(policy) for policy in self.policies}
         rows = []
         for name in self.split or splits.evaluated(self.reaches):
-            cases = first(splits.load(self.reaches, name).cases, self.rows)
+            cases = _first(splits.load(self.reaches, name).cases, self.rows)
             for player, agent in players.items():
                 played = cases if agent else evaluation.contrasted(cases)
                 found = evaluation.evaluate(model, source, played, agent, self.threads)
@@ -101,7 +101,7 @@ class Explain:
         from dextron_bench.world.sources import open_source
 
         model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
-        cases = first(splits.load(self.reaches, self.split).cases, self.rows)
+        cases = _first(splits.load(self.reaches, self.split).cases, self.rows)
         policies = {str(policy): weights.own(policy) for policy in self.policies}
         found = explanation.choose(explanation.foreseen(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
@@ -127,10 +127,9 @@ class Explain:
         return 0
 
 
-def first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
-    """The first so many cases; raises NoRows."""
+def _first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
     if rows < 1:
-        raise NoRows(f"how many settings of a split are played is 1 or more, not {rows}")
+        raise NoRows(f"--rows is how many settings of a split are played, 1 or more, not {rows}")
     return cases[:rows]
 
 
