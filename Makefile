@@ -14,7 +14,7 @@ TORCH ?= torch==2.13.0
 # Tests render off screen: EGL where the system has it, OSMesa else.
 export MUJOCO_GL ?= $(shell ldconfig -p 2>/dev/null | grep -q libEGL.so.1 && echo egl || echo osmesa)
 
-.PHONY: setup run test check bench
+.PHONY: setup run test check bench docs
 .DEFAULT_GOAL := test
 
 READY = $(VENV)/.ready
@@ -47,3 +47,8 @@ bench: $(ENVIRONMENT)
 	mkdir -p .benchmarks
 	$(PYTHON) -m pytest -q -o addopts= tests/benchmarks --benchmark-json=.benchmarks/bench.json $(ARGS)
 	$(PYTHON) tests/benchmarks/table.py .benchmarks/bench.json docs/benchmarks.md
+
+# The documentation site, in site/. Open site/index.html, or serve the folder: python3 -m http.server -d site
+docs: $(ENVIRONMENT)
+	$(PYTHON) -c 'import material, mkdocstrings_handlers.python' || $(PYTHON) -m pip install --quiet -c constraints.txt -e '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
