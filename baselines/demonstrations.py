@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from dextron_bench import provenance
-from dextron_bench.experts import ExpertAgent
+from dextron_bench.experts import Case, ExpertAgent
 from dextron_bench.learning import Track
-from dextron_bench.rollout import Case, rollout
+from dextron_bench.rollout import rollout
+from dextron_bench.storage import atomic, hashing
 from dextron_bench.world import model
 from safetensors.numpy import load_file, save_file
 
@@ -52,7 +52,7 @@ def of(track: Track, episodes: int | None = None) -> Demonstrations:
     file = track.cache / f"demonstrations-{_digest(cases)[:16]}.safetensors"
     if not file.exists():
         made = play(track, cases)
-        provenance.write_whole(file, lambda part: save_file(made, part))
+        atomic.write_atomically(file, lambda part: save_file(made, part))
     found = load_file(file)
     return Demonstrations(**found)
 
@@ -72,4 +72,4 @@ def play(track: Track, cases: Sequence[Case]) -> dict[str, np.ndarray]:
 
 def _digest(cases: Sequence[Case]) -> str:
     """SHA-256 of what the episodes depend on."""
-    return provenance.digest(f"{FORMAT} {model.mjcf_hash()}".encode(), *(repr(case).encode() for case in cases))
+    return hashing.digest(f"{FORMAT} {model.mjcf_hash()}".encode(), *(repr(case).encode() for case in cases))

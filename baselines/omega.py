@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 import numpy as np
-from dextron_bench import tensors
+from dextron_bench.storage import hashing, tensors
 from dextron_bench.success import network
 from dextron_bench.success.network import GRID, SuccessModel
 from dextron_bench.world import task
@@ -65,7 +65,7 @@ class Omega:
             known = ", ".join(SOURCES)
             raise NoModel(f"--model takes the file of a model (*{FILE}) or one of {known}, not {self.model!r}")
         try:
-            found = tensors.sha256(Path(self.model)) if self.model.endswith(FILE) else network.digest(self.model)
+            found = hashing.sha256(Path(self.model)) if self.model.endswith(FILE) else network.digest(self.model)
         except (OSError, network.MissingModel) as error:
             raise NoModel(f"no success model at hand ({error}); --model takes the file of one") from error
         if found != (self.sha256 or found):

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from dextron_bench import provenance
+from dextron_bench.storage import atomic, folder_config
 from dextron_bench.world import model, task
 
+SEARCH = "search.json"  # Which search the folder belongs to.
 KEPT = 1.0  # Rows with a sum of rewards above this are kept (paper, II.C).
-
-
-class SearchMismatch(ValueError):
-    """A folder that holds another search than the one asked for."""
 
 
 class DamagedBlock(ValueError):
@@ -35,28 +31,19 @@ class Tally:
 
 def claim(search: dict[str, Any], folder: Path) -> None:
     """Makes the folder this search's, or checks that it is."""
-    wanted = json.loads(json.dumps({"search": search, "physics": model.mjcf_hash()}))
-    file = folder / "search.json"
-    if not file.exists():
-        provenance.write_json(file, wanted)
-    found = json.loads(file.read_text(encoding="utf-8"))
-    if found != wanted:
-        old, new = ({**each.get("search", {}), "physics": each.get("physics")} for each in (found, wanted))
-        other = [name for name in old | new if old.get(name) != new.get(name)]
-        raise SearchMismatch(
-            f"{folder} holds another search, which differs in {', '.join(other)}; choose another folder, or remove it"
-        )
+    config = {"search": search, "physics": model.mjcf_hash()}
+    folder_config.write_or_check(folder / SEARCH, config, "a search", "choose another folder, or remove it")
 
 
 def claimed(folder: Path) -> dict[str, Any]:
     """Which search, under which physics, a folder was claimed for; empty where it was for none."""
-    file = folder / "search.json"
-    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    file = folder / SEARCH
+    return atomic.read_json(file) if file.exists() else {}
 
 
 def write(folder: Path, number: int, draws: pd.DataFrame) -> None:
     """Puts a block in store, whole."""
-    provenance.write_whole(file_of(folder, number), lambda part: draws.to_parquet(part, compression="zstd"))
+    atomic.write_atomically(file_of(folder, number), lambda part: draws.to_parquet(part, compression="zstd"))
 
 
 def file_of(folder: Path, number: int) -> Path:

@@ -15,10 +15,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from dextron_bench import provenance, tensors
 from dextron_bench.learning import Trainer
-from dextron_bench.records import DamagedRun, RunMismatch
 from dextron_bench.rollout import AgentError, blaming
+from dextron_bench.storage import atomic, tensors
+from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.folder_config import FolderMismatch
 
 try:
     import fcntl
@@ -71,7 +72,7 @@ class Checkpoints:
             yield
 
     def progress(self) -> Progress | None:
-        """How far the last checkpoint is; None where there is none. Raises DamagedRun."""
+        """How far the last checkpoint is; None where there is none. Raises DamagedFile."""
         file = self.folder / CHECKPOINT
         if not file.exists():
             return None
@@ -97,11 +98,11 @@ class Checkpoints:
     def resume(self, trainer: Trainer, device: str) -> None:
         """Puts a trainer where the last checkpoint is and drops what was written after it.
 
-        Raises DamagedRun, and RunMismatch where another device computed so far, since its last bits differ.
+        Raises DamagedFile, and FolderMismatch where another device computed so far, since its last bits differ.
         """
         done = self.progress()
         if done and done.device != device:
-            raise RunMismatch(
+            raise FolderMismatch(
                 f"{self.folder} was begun on {done.device}: go on with --device {done.device}, or remove it"
             )
         self._discard(done.epoch if done else 0)
@@ -133,7 +134,7 @@ class Checkpoints:
         return sorted(epoch for epoch in found if done and epoch <= done.epoch)
 
     def metrics(self) -> list[dict[str, Any]]:
-        """One row for each epoch and seed, in order; raises DamagedRun."""
+        """One row for each epoch and seed, in order; raises DamagedFile."""
         try:
             lines = (self.folder / METRICS).read_text(encoding="utf-8").splitlines()
             return [json.loads(line) for line in lines]
@@ -153,7 +154,7 @@ class Checkpoints:
         if len(kept) < epoch * len(self.seeds):
             raise self._damaged(f"{METRICS} ends before epoch {epoch}")
         if lines != kept:
-            provenance.write_whole(file, lambda part: part.write_bytes(b"".join(kept)))
+            atomic.write_atomically(file, lambda part: part.write_bytes(b"".join(kept)))
 
     def _journaled(self) -> list[int]:
         """The epochs after which there is a journal, in order."""
@@ -162,5 +163,5 @@ class Checkpoints:
     def _journal(self, epoch: int) -> Path:
         return self.folder / JOURNALS / f"{epoch:06d}.safetensors"
 
-    def _damaged(self, why: object) -> DamagedRun:
-        return DamagedRun(self.folder, why)
+    def _damaged(self, why: object) -> DamagedFile:
+        return DamagedFile(self.folder, why)

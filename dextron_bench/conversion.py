@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dextron_bench import film, provenance, recording
-from dextron_bench.rollout import Episode
+from dextron_bench import film, recording
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.storage import atomic
 from dextron_bench.world import model
 
 FILMS = {".mp4": film.mp4, ".gif": film.gif}
@@ -33,11 +34,11 @@ def export(source: Path, into: Path, look: film.Look, report: film.Report = lamb
         raise UnknownEnding(into)
     episode = recording.read_safely(source).episode
     if ending in FILMS:
-        provenance.write_whole(into, lambda part: FILMS[ending](part, episode.states, look, report))
+        atomic.write_atomically(into, lambda part: FILMS[ending](part, episode.states, look, report))
     elif ending == ".csv":
-        provenance.write_whole(into, lambda part: table(episode).to_csv(part, index=False))
+        atomic.write_atomically(into, lambda part: table(episode).to_csv(part, index=False))
     else:
-        provenance.write_whole(into, lambda part: table(episode).to_parquet(part, index=False))
+        atomic.write_atomically(into, lambda part: table(episode).to_parquet(part, index=False))
 
 
 def table(episode: Episode) -> pd.DataFrame:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from dextron_bench import provenance, tensors
 from dextron_bench.checkpoints import Checkpoints
 from dextron_bench.learning import Learner
-from dextron_bench.records import DamagedRun, read_json
 from dextron_bench.rollout import blaming, rollout
 from dextron_bench.splits import Split
+from dextron_bench.storage import atomic, tensors
+from dextron_bench.storage.atomic import DamagedFile, read_json
 from dextron_bench.world import task
 from dextron_bench.world.setting import Source
 
@@ -57,14 +57,14 @@ class Curve:
         if file.exists() and (found := read_json(file)).get("digest") == self._val.digest:
             return found["scores"]
         scores = self._play(snapshot, rows)
-        provenance.write_json(file, {"digest": self._val.digest, "scores": scores})
+        atomic.write_json(file, {"digest": self._val.digest, "scores": scores})
         return scores
 
     def _play(self, snapshot: Path, rows: int) -> list[float]:
         try:
             weights = tensors.read(snapshot)
         except (tensors.BadTensors, FileNotFoundError) as error:
-            raise DamagedRun(snapshot, error) from error
+            raise DamagedFile(snapshot, error) from error
         with blaming(f"policy() of method {self._learner.name!r}"):
             agent = self._learner.policy(weights)
         cases = self._val.cases[:rows]

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench import blocks, montecarlo, provenance
-from dextron_bench.world import setting, task
+from dextron_bench import blocks, montecarlo
+from dextron_bench.storage import atomic, hashing, provenance
+from dextron_bench.world import model, setting, task
 
 BANDS = 9  # Equal bands of d_c in the statistics.
 
@@ -28,7 +29,7 @@ def save(
     """Writes the kept rows as `<name>.parquet` and a summary as `<name>.json`; returns the file and the summary."""
     kept = draws[draws["score"] > blocks.KEPT].reset_index(drop=True).astype({"length": int})
     file = folder / f"{name}.parquet"
-    provenance.write_whole(file, lambda part: kept.to_parquet(part, compression="zstd"))
+    atomic.write_atomically(file, lambda part: kept.to_parquet(part, compression="zstd"))
     about = {
         "search": asdict(search),
         "digest": digest(kept),
@@ -37,9 +38,9 @@ def save(
         "kept": len(kept),
         "solved": int((kept["score"] == task.SUCCESS).sum()),
         "statistics": statistics(draws, source).to_dict("records"),
-        "provenance": provenance.collect(),
+        "provenance": provenance.collect(model.mjcf_hash()),
     }
-    provenance.write_json(file.with_suffix(".json"), about)
+    atomic.write_json(file.with_suffix(".json"), about)
     return file, about
 
 
@@ -82,7 +83,7 @@ def digest(rows: pd.DataFrame) -> str:
     """SHA-256 of a database's rows in order."""
     names = "\n".join(rows["reach"]).encode()
     numbers = rows.drop(columns="reach").sort_index(axis=1)
-    return provenance.digest(names, *(np.ascontiguousarray(numbers[c], "<f8").tobytes() for c in numbers))
+    return hashing.digest(names, *(np.ascontiguousarray(numbers[c], "<f8").tobytes() for c in numbers))
 
 
 def statistics(draws: pd.DataFrame, source: setting.Source) -> pd.DataFrame:

@@ -30,8 +30,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import closes
-from dextron_bench.rollout import Case, Episode
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts import Case, closes
 from dextron_bench.world import model, task
 
 CAUSES = ("solved", "too early", "too late", "knocked over", "slipped", "never reached", "agent failed")

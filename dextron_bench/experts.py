@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dextron_bench.world import task
+from dextron_bench.world.setting import Setting
 
 GAIN = (1.0, 1.5)  # K, drawn uniformly (table I).
 CRITICAL_DISTANCE = (0.01, 0.90)  # d_c, as a fraction of the first distance, drawn uniformly (table I).
@@ -21,6 +22,15 @@ class Expert:
 
     gain: float
     critical: float
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What an agent is tried on: a setting, an expert for it, and the width of the range of d_c that succeeds."""
+
+    setting: Setting
+    expert: Expert
+    window: float
 
 
 def closes(distances: np.ndarray, first: np.ndarray, critical: np.ndarray) -> np.ndarray:

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dextron_bench import provenance
-from dextron_bench.rollout import Agent, Episode, rollout
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.rollout import Agent, rollout
 from dextron_bench.splits import Split
-from dextron_bench.world import task
+from dextron_bench.storage import provenance
+from dextron_bench.world import model, task
 from dextron_bench.world.setting import Source
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ class Export:
             "dextron_bench": {
                 "split": {"reaches": split.reaches, "name": split.name, "digest": split.digest, "rows": self.rows},
                 "players": [{"name": player.name, **player.about} for player in self.players],
-                "provenance": provenance.collect(),
+                "provenance": provenance.collect(model.mjcf_hash()),
             },
         }
 

@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench import diagnosis, records
+from dextron_bench.storage import atomic
 
 LIMIT = 5  # Episodes that are picked where nobody says how many.
 
@@ -59,7 +60,7 @@ def recordings(places: Sequence[Path]) -> list[Path]:
 
 
 def hashes(files: Sequence[Path]) -> dict[Path, str]:
-    """The SHA-256 of those recordings of which their run's manifest tells one; raises DamagedRun."""
+    """The SHA-256 of those recordings of which their run's manifest tells one; raises DamagedFile."""
     manifests = {run: records.manifest(run) for run in {file.parent.parent for file in files}}
     told = [(file, manifests[file.parent.parent]) for file in files]
     return {file: manifest[file.name] for file, manifest in told if file.name in manifest}
@@ -68,22 +69,22 @@ def hashes(files: Sequence[Path]) -> dict[Path, str]:
 def episodes(places: Sequence[Path]) -> pd.DataFrame:
     """The episodes of all runs at places: their tables' rows, with `folder`, `method`, `reaches` and `seed` of the run.
 
-    Raises NothingToView, DamagedRun.
+    Raises NothingToView, DamagedFile.
     """
     tables = [records.stored(folder, ()).assign(folder=str(folder), **whose(folder)) for folder in _runs(places)]
     return pd.concat(tables, ignore_index=True)
 
 
 def whose(folder: Path) -> dict[str, Any]:
-    """Method, source of reaches and seed of a run, as its recordings tell them; raises DamagedRun."""
+    """Method, source of reaches and seed of a run, as its recordings tell them; raises DamagedFile."""
     if (folder / records.RESULT).exists():
         told = records.read_result(folder / records.RESULT)
     else:  # A run under way, whose folder is called after it.
-        told = records.read_json(folder / records.CONFIG) | {"method": folder.resolve().parents[1].name}
+        told = atomic.read_json(folder / records.CONFIG) | {"method": folder.resolve().parents[1].name}
     try:
         return {name: told[name] for name in ("method", "reaches", "seed")}
     except KeyError as error:
-        raise records.DamagedRun(folder / records.CONFIG, f"it lacks {error}") from error
+        raise atomic.DamagedFile(folder / records.CONFIG, f"it lacks {error}") from error
 
 
 def pick(table: pd.DataFrame, wish: Wish) -> tuple[pd.DataFrame, int]:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 if TYPE_CHECKING:  # A learner's file is read by the isolated process of its agent, which may not import the world.
-    from dextron_bench.rollout import Agent, Case
+    from dextron_bench.experts import Case
+    from dextron_bench.rollout import Agent
     from dextron_bench.world.setting import Source
 
 Arrays = dict[str, np.ndarray]  # Named arrays, as a safetensors file holds them.

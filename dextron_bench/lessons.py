@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dextron_bench import provenance, records, splits, tensors, training, weights
+from dextron_bench import records, splits, training, weights
 from dextron_bench.checkpoints import Checkpoints
 from dextron_bench.curve import Curve
 from dextron_bench.learning import Learner, Track
+from dextron_bench.storage import atomic, tensors
 from dextron_bench.world import sources
 
 CURVE = "curve.json"  # In a run's folder.
@@ -44,7 +45,7 @@ class Course:
     def teach(self, seeds: Sequence[int], report: training.Report | None = None) -> None:
         """Trains seeds that are not trained yet, and puts best weights and curve into the folders of their runs.
 
-        Raises Diverged, AgentError, Busy, NoDevice, RunMismatch, DamagedRun, UnknownSplit, MissingData.
+        Raises Diverged, AgentError, Busy, NoDevice, FolderMismatch, DamagedFile, UnknownSplit, MissingData.
         """
         for seed in seeds:
             records.check(self._run(seed), records.config(self.learner, self.reaches, seed))
@@ -96,7 +97,7 @@ class Course:
         frames = tensors.read_about(done.snapshot(last, seed)).get("frames")
         about = tensors.read_about(snapshot) | {"best_epoch": best, "epochs": last, "frames": frames and int(frames)}
         del about["epoch"]
-        provenance.write_json(self._run(seed) / CURVE, {"split": "val", "points": curve.points(seed)})
+        atomic.write_json(self._run(seed) / CURVE, {"split": "val", "points": curve.points(seed)})
         tensors.write(self._run(seed) / weights.FILE, tensors.read(snapshot), about | {"reaches": self.reaches})
 
 
@@ -111,7 +112,7 @@ class UnderWay:
 
 
 def under_way(runs: Path) -> list[UnderWay]:
-    """The trainings below a folder of runs that are not over; raises DamagedRun."""
+    """The trainings below a folder of runs that are not over; raises DamagedFile."""
     found = []
     for folder, group in training.groups(runs, "*/*/").items():
         progress = Checkpoints(folder, group).progress()

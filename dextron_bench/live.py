@@ -9,11 +9,12 @@ from typing import Protocol
 import numpy as np
 
 from dextron_bench import methods, weights
-from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.experts import Case, Expert, ExpertAgent
 from dextron_bench.learning import Heir, Learner
-from dextron_bench.rollout import Agent, Case, Episode, Privileged, blaming, rollout
-from dextron_bench.success.insight import Insight
-from dextron_bench.success.network import SuccessModel
+from dextron_bench.rollout import Agent, Privileged, blaming, rollout
+from dextron_bench.success.network import GRID, SuccessModel
 from dextron_bench.world import model as world
 from dextron_bench.world.setting import Source
 
@@ -74,7 +75,7 @@ class _Watched:
     def insight(self) -> Insight:
         """The thoughts so far."""
         curves, chances, experts = (np.concatenate(each) for each in (self._curves, self._chances, self._experts))
-        return Insight(curves, chances, experts, self._duration)
+        return Insight(GRID, curves, chances, experts, self._duration)
 
     def assign(self, episodes: np.ndarray, experts: Sequence[Expert]) -> None:
         """Tells the agent its expert where it asks for one."""

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench import blocks, experts, opening
+from dextron_bench.storage import folder_config
 from dextron_bench.world import setting
 from dextron_bench.world.engine import Engine
 
@@ -95,7 +96,7 @@ def run(
     """Searches on until `rows` rows have all 20 rewards; returns every draw with its outcome, in order.
 
     Columns: those of `draw`, then `score` (sum of rewards) and `length` [control steps]. Processes with
-    different shares may work in one folder. Raises SearchMismatch where it holds another search, and
+    different shares may work in one folder. Raises FolderMismatch where it holds another search, and
     DamagedBlock.
     """
     blocks.claim(asdict(search), folder)
@@ -117,7 +118,7 @@ def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataF
     """Puts in store the first `count` blocks, of which a database holds the `kept` rows, to search on from there.
 
     Only what a database knows comes back: draws it did not keep get a score of 0 and no length. Blocks
-    already in store stay. Raises SearchMismatch where rows are not of this search.
+    already in store stay. Raises FolderMismatch where rows are not of this search.
     """
     blocks.claim(asdict(search), folder)
     key = ["reach", "gain", "critical"]
@@ -132,7 +133,7 @@ def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataF
         if not blocks.file_of(folder, number).exists():
             blocks.write(folder, number, draws)
     if found < len(kept):
-        raise blocks.SearchMismatch(f"row {found} of the database is not of a search with seed {search.seed}")
+        raise folder_config.FolderMismatch(f"row {found} of the database is not of a search with seed {search.seed}")
 
 
 def _play(

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench import experts, opening, provenance, splits
+from dextron_bench import experts, opening, splits
+from dextron_bench.storage import atomic
 from dextron_bench.world import setting, task
 from dextron_bench.world.engine import Engine
 
@@ -140,14 +141,14 @@ def build(
 
 def write(reaches: str, table: pd.DataFrame, folder: Path) -> dict[str, dict[str, Any]]:
     """Writes a source's splits, one after another in `table`, into `folder`; returns their entry in its catalogue."""
-    provenance.write_whole(folder / f"splits-{reaches}.parquet", lambda part: table.to_parquet(part))
+    atomic.write_atomically(folder / f"splits-{reaches}.parquet", lambda part: table.to_parquet(part))
     entry = {
         str(name): {"rows": len(rows), "digest": splits.digest(rows)}
         for name, rows in table.groupby("split", sort=False)
     }
     catalogue = folder / "splits.json"
     others = json.loads(catalogue.read_text(encoding="utf-8")) if catalogue.exists() else {}
-    provenance.write_json(catalogue, others | {reaches: entry})
+    atomic.write_json(catalogue, others | {reaches: entry})
     return entry
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from dextron_bench.experts import Expert, ExpertAgent
-from dextron_bench.rollout import Case, Episode, rollout
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts import Case, Expert, ExpertAgent
+from dextron_bench.rollout import rollout
 from dextron_bench.world import appearance, model
 from dextron_bench.world.minjerk import MinjerkSource
 from dextron_bench.world.setting import Setting

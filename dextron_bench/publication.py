@@ -10,10 +10,11 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench import leaderboard, methods, provenance, records, splits, weights
+from dextron_bench import leaderboard, methods, records, splits, weights
 from dextron_bench.diagnosis import CAUSES
 from dextron_bench.learning import Learner
 from dextron_bench.lessons import CURVE
+from dextron_bench.storage import atomic
 
 RESULTS = "results"  # In the leaderboard's folder: a folder of runs less their large files.
 BEGIN, END = "<!-- made by `dextron-bench leaderboard build`: -->", "<!-- end of what was made -->"
@@ -29,7 +30,7 @@ def take(runs: Path, into: Path) -> list[Path]:
     """Copies results and curves of finished runs into the leaderboard's folder, and weights beside their methods.
 
     A run is finished when its result holds all rows of all splits that rank methods. Returns the folders of results
-    that were written; raises NothingToPublish, DamagedRun, UnknownMethod, BadSettings.
+    that were written; raises NothingToPublish, DamagedFile, UnknownMethod, BadSettings.
     """
     taken = []
     for file in sorted(runs.glob(f"*/*/seed*/{records.RESULT}")):
@@ -38,7 +39,7 @@ def take(runs: Path, into: Path) -> list[Path]:
             continue
         place = into / RESULTS / file.parent.relative_to(runs)
         known = place / records.RESULT
-        provenance.write_json(known, _checked(result, records.read_result(known)) if known.exists() else result)
+        atomic.write_json(known, _checked(result, records.read_result(known)) if known.exists() else result)
         if (found := file.with_name(CURVE)).exists():
             _copy(found, place / CURVE)
         _ship(file.parent, result)
@@ -51,7 +52,7 @@ def take(runs: Path, into: Path) -> list[Path]:
 def build(into: Path) -> list[Path]:
     """Makes the table (CSV, JSON), its short form in the README, learning curves and the page from the results.
 
-    The page links to recordings in the folder beside. Returns the files; raises DamagedRun, BrokenRecording.
+    The page links to recordings in the folder beside. Returns the files; raises DamagedFile, BrokenRecording.
     """
     from dextron_bench import figures, page
     from dextron_bench.page.showreel import FOLDER
@@ -60,8 +61,8 @@ def build(into: Path) -> list[Path]:
     rows = leaderboard.table(results)
     known = _whole(rows, results)
     made = [into / "table.csv", into / "README.md", into / "table.json"]
-    provenance.write_whole(made[0], lambda part: known.to_csv(part, index=False, float_format="%.6g"))
-    provenance.write_whole(made[2], lambda part: known.to_json(part, orient="records", indent=1))
+    atomic.write_atomically(made[0], lambda part: known.to_csv(part, index=False, float_format="%.6g"))
+    atomic.write_atomically(made[2], lambda part: known.to_json(part, orient="records", indent=1))
     curves: dict[str, dict[str, Curves]] = defaultdict(dict)
     for (method, reaches), found in learning_curves(into / RESULTS).items():
         curves[reaches][method] = found
@@ -71,7 +72,7 @@ def build(into: Path) -> list[Path]:
         figures.learning_curves(found, rows[rows["reaches"] == reaches], made[-1])
     made.append(into / page.FILE)
     text = page.document(rows, results, curves, into.resolve().parent / FOLDER)
-    provenance.write_whole(made[-1], lambda part: part.write_text(text, encoding="utf-8"))
+    atomic.write_atomically(made[-1], lambda part: part.write_text(text, encoding="utf-8"))
     return made
 
 
@@ -84,14 +85,14 @@ def _whole(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.DataFram
 
 
 def learning_curves(runs: Path, cloned: bool = False) -> dict[tuple[str, str], Curves]:
-    """The learning curves of runs that live in the world, by method and source of reaches; raises DamagedRun.
+    """The learning curves of runs that live in the world, by method and source of reaches; raises DamagedFile.
 
     What has no frames has no place on their axis: it is `cloned` from demonstrations.
     """
     found: dict[tuple[str, str], Curves] = defaultdict(dict)
     for file in sorted(runs.glob(f"*/*/seed*/{CURVE}")):
         result = records.read_result(file.with_name(records.RESULT))
-        points = pd.DataFrame(records.read_json(file)["points"])
+        points = pd.DataFrame(atomic.read_json(file)["points"])
         if (result["training"]["frames"] is None) == cloned:
             found[result["method"], result["reaches"]][result["seed"]] = points
     return found
@@ -118,7 +119,7 @@ def _checked(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
 
 def _ship(folder: Path, result: dict[str, Any]) -> None:
     """Puts an installed learner's weights where `eval` finds them; those of a file's stay with whose they are."""
-    config = records.read_json(folder / records.CONFIG)
+    config = atomic.read_json(folder / records.CONFIG)
     if config["code"]["sha256"]:
         return
     method = methods.create(config["code"]["class"], config["settings"])
@@ -127,7 +128,7 @@ def _ship(folder: Path, result: dict[str, Any]) -> None:
 
 
 def _copy(file: Path, place: Path) -> None:
-    provenance.write_whole(place, lambda part: shutil.copyfile(file, part))
+    atomic.write_atomically(place, lambda part: shutil.copyfile(file, part))
 
 
 def _insert(file: Path, text: str) -> None:
@@ -136,7 +137,7 @@ def _insert(file: Path, text: str) -> None:
     before, _, rest = old.partition(BEGIN)
     after = rest.partition(END)[2] or "\n"
     new = f"{before.rstrip()}\n\n{BEGIN}\n{text}\n{END}{after}"
-    provenance.write_whole(file, lambda part: part.write_text(new, encoding="utf-8"))
+    atomic.write_atomically(file, lambda part: part.write_text(new, encoding="utf-8"))
 
 
 def _picture(reaches: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -10,8 +9,11 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench import diagnosis, entrants, methods, provenance, splits, traces
-from dextron_bench.rollout import Case, Episode
+from dextron_bench import diagnosis, entrants, methods, splits
+from dextron_bench.evaluation import predictions
+from dextron_bench.evaluation.episodes import Episode, action_hashes, trace
+from dextron_bench.experts import Case
+from dextron_bench.storage import atomic, folder_config, provenance
 from dextron_bench.success import insight, network
 from dextron_bench.world import model, setting
 
@@ -20,18 +22,8 @@ PROVENANCE = "provenance.json"
 EPISODES = "episodes.parquet"
 RESULT = "result.json"
 MAKER = ("method", "code", "settings")  # Of a run's config, what a result repeats: by it the agent is made again.
+HELD = "a run", "remove it, or choose another folder with --runs"
 MANIFEST = "recordings.json"  # The SHA-256 of every recording.
-
-
-class RunMismatch(ValueError):
-    """A run folder that holds something else than what is asked for."""
-
-
-class DamagedRun(ValueError):
-    """A file of a run that is not whole; the message names it and says what to do."""
-
-    def __init__(self, file: Path, why: object) -> None:
-        super().__init__(f"{file} is damaged ({why}); remove it and run again")
 
 
 def config(method: methods.Entrant, reaches: str, seed: int) -> dict[str, Any]:
@@ -47,23 +39,15 @@ def config(method: methods.Entrant, reaches: str, seed: int) -> dict[str, Any]:
 
 
 def check(folder: Path, config: dict[str, Any]) -> None:
-    """Raises RunMismatch where the folder holds a run of another config, DamagedRun where that cannot be told."""
-    file = folder / CONFIG
-    if not file.exists():
-        return
-    found, wanted = read_json(file), json.loads(json.dumps(config))
-    if other := [name for name in wanted if found.get(name) != wanted[name]]:
-        raise RunMismatch(
-            f"{folder} holds a run with other {' and '.join(other)}; remove it, or choose another folder with --runs"
-        )
+    """Raises FolderMismatch where the folder holds a run of another config, DamagedFile where that cannot be told."""
+    folder_config.check(folder / CONFIG, config, *HELD)
 
 
 def claim(folder: Path, config: dict[str, Any]) -> None:
     """Makes the folder the run's that has this config; raises what `check` does."""
     if not (folder / CONFIG).exists():  # Written last, so that whoever finds it finds the rest.
-        provenance.write_json(folder / PROVENANCE, provenance.collect())
-        provenance.write_json(folder / CONFIG, config)
-    check(folder, config)
+        atomic.write_json(folder / PROVENANCE, provenance.collect(model.mjcf_hash()))
+    folder_config.write_or_check(folder / CONFIG, config, *HELD)
 
 
 def row(split: splits.Split, index: int, episode: Episode) -> dict[str, Any]:
@@ -83,13 +67,13 @@ def row(split: splits.Split, index: int, episode: Episode) -> dict[str, Any]:
         "cause": found.cause,
         "closing_lag": found.closing_lag,
         "actions": episode.actions[:, 0],
-        "trace": traces.trace(episode),
+        "trace": trace(episode),
         "final": episode.states[-1],
     }
 
 
 def stored(folder: Path, wanted: Sequence[splits.Split]) -> pd.DataFrame:
-    """Episodes already in the folder, less those of splits that have changed since; raises DamagedRun."""
+    """Episodes already in the folder, less those of splits that have changed since; raises DamagedFile."""
     file = folder / EPISODES
     if not file.exists():
         return pd.DataFrame()
@@ -98,12 +82,12 @@ def stored(folder: Path, wanted: Sequence[splits.Split]) -> pd.DataFrame:
         now = episodes["split"].map({split.name: split.digest for split in wanted})
         return episodes[now.isna() | (now == episodes["digest"])]
     except (OSError, ValueError, KeyError) as error:
-        raise DamagedRun(file, error) from error
+        raise atomic.DamagedFile(file, error) from error
 
 
 def store(folder: Path, episodes: pd.DataFrame) -> None:
     """Puts all episodes of a run in place of those that were there."""
-    provenance.write_whole(folder / EPISODES, lambda part: episodes.to_parquet(part))
+    atomic.write_atomically(folder / EPISODES, lambda part: episodes.to_parquet(part))
 
 
 def unrecorded(folder: Path, done: pd.DataFrame, record: int) -> bool:
@@ -126,12 +110,12 @@ def record(
     properties["physics"] = model.mjcf_hash()
     file, path = recording_file(folder, split.name, index), source.path(episode.setting)
     sha256 = recording.write(file, episode, path, properties, _insight(source, split.cases[index], episode))
-    provenance.write_json(folder / MANIFEST, manifest(folder) | {file.name: sha256})
+    atomic.write_json(folder / MANIFEST, manifest(folder) | {file.name: sha256})
 
 
 def manifest(folder: Path) -> dict[str, str]:
-    """The SHA-256 of each of a run's recordings by the file's name; raises DamagedRun."""
-    return read_json(folder / MANIFEST) if (folder / MANIFEST).exists() else {}
+    """The SHA-256 of each of a run's recordings by the file's name; raises DamagedFile."""
+    return atomic.read_json(folder / MANIFEST) if (folder / MANIFEST).exists() else {}
 
 
 def recording_file(folder: Path, split: str, index: int) -> Path:
@@ -139,7 +123,7 @@ def recording_file(folder: Path, split: str, index: int) -> Path:
     return folder / "recordings" / f"{split}-{index:04d}.rrd"
 
 
-def _insight(source: setting.Source, case: Case, episode: Episode) -> insight.Insight | None:
+def _insight(source: setting.Source, case: Case, episode: Episode) -> predictions.Insight | None:
     """None where no success model ships for the source."""
     try:
         judge = network.shipped(source.name)
@@ -153,11 +137,11 @@ def conclude(folder: Path, episodes: pd.DataFrame, about: dict[str, Any], second
 
     `seconds` of training are part of where it was made, which differs from one making to the next.
     """
-    made = read_json(folder / CONFIG)
-    found = {"splits": scores(episodes), "provenance": read_json(folder / PROVENANCE)}
+    made = atomic.read_json(folder / CONFIG)
+    found = {"splits": scores(episodes), "provenance": atomic.read_json(folder / PROVENANCE)}
     found["provenance"] |= {} if seconds is None else {"seconds": seconds}
     found["maker"] = {name: made[name] for name in MAKER if name in made}
-    provenance.write_json(folder / RESULT, {**about, **found})
+    atomic.write_json(folder / RESULT, {**about, **found})
 
 
 def scores(episodes: pd.DataFrame) -> dict[str, Any]:
@@ -174,33 +158,22 @@ def _scores(rows: pd.DataFrame) -> dict[str, Any]:
         "closing_lag": None if rows["closing_lag"].isna().all() else round(float(rows["closing_lag"].median()), 3),
     }
     kept = rows["actions"] if "actions" in rows else pd.Series([None])
-    return told if kept.isna().any() else told | {"actions": traces.of_actions(kept)}
+    return told if kept.isna().any() else told | {"actions": action_hashes(kept)}
 
 
 def results(folder: Path) -> Iterator[dict[str, Any]]:
-    """Every result below a folder of runs; raises DamagedRun."""
+    """Every result below a folder of runs; raises DamagedFile."""
     for file in sorted(folder.glob(f"*/*/seed*/{RESULT}")):
         yield read_result(file)
 
 
 def read_result(file: Path) -> dict[str, Any]:
-    """The content of a `result.json`; raises DamagedRun."""
-    found = read_json(file)
+    """The content of a `result.json`; raises DamagedFile."""
+    found = atomic.read_json(file)
     try:
         parts = [found["method"], found["reaches"], found["seed"]]
         for each in found["splits"].values():
             parts += [each["digest"][:8], sum(each["scores"]), each["failed"], sum(each["causes"].values())]
     except (KeyError, TypeError, AttributeError) as error:
-        raise DamagedRun(file, f"no result: {type(error).__name__} {error}") from error
-    return found
-
-
-def read_json(file: Path) -> dict[str, Any]:
-    """A JSON object from a file; raises DamagedRun."""
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise DamagedRun(file, error) from error
-    if not isinstance(found, dict):
-        raise DamagedRun(file, "it holds no JSON object")
+        raise atomic.DamagedFile(file, f"no result: {type(error).__name__} {error}") from error
     return found

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from dextron_bench.experts import Expert
-from dextron_bench.rollout import Case, Episode, rollout
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts import Case, Expert
+from dextron_bench.rollout import rollout
 from dextron_bench.world.setting import Setting, Source
 
 NOBODY = Expert(1.0, 0.0)  # Stands in a case that no expert plays.

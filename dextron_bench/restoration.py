@@ -10,8 +10,9 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench import gallery, recording, records, splits
+from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.replay import replay
-from dextron_bench.rollout import Episode
+from dextron_bench.storage import atomic
 from dextron_bench.world import model, sources
 from dextron_bench.world.setting import from_frame
 
@@ -67,7 +68,7 @@ def _check_playable(row: dict[Any, Any], why: str) -> None:
             f"{called} {told}, and its actions were not kept; remove {folder / records.EPISODES} and {again}: "
             "episodes are played again, nothing is trained"
         )
-    if records.read_json(folder / records.CONFIG).get("physics") != model.mjcf_hash():
+    if atomic.read_json(folder / records.CONFIG).get("physics") != model.mjcf_hash():
         raise Unplayable(f"{called} was played with other physics than this version's; remove {folder} and {again}")
     if splits.load(row["reaches"], row["split"]).digest != row["digest"]:
         raise Unplayable(f"{called} is of a version of the split that is no more; {again}")

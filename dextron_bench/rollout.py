@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from dextron_bench.experts import Expert
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts import Case, Expert
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine, Step
-from dextron_bench.world.setting import Setting, Source
+from dextron_bench.world.setting import Source
 
 SLOTS = 256  # Episodes at once. Fixed, because an entrant's last bits may depend on the batch (see `exact`).
 
@@ -36,41 +36,6 @@ class Privileged(Protocol):
     def assign(self, episodes: np.ndarray, experts: Sequence[Expert]) -> None:
         """Comes before `reset`: rows `episodes` (n,) are about to play these experts' settings."""
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """What an agent is tried on: a setting, an expert for it, and the width of the range of d_c that succeeds."""
-
-    setting: Setting
-    expert: Expert
-    window: float
-
-
-@dataclass(frozen=True, slots=True)
-class Episode:
-    """One rollout: states (T + 1, 48), actions (T, 1), rewards (T,), float64, and how it ended.
-
-    `failure` says what the agent did wrong where that ended the episode; such an episode scores 0.
-    """
-
-    setting: Setting
-    states: np.ndarray
-    actions: np.ndarray
-    rewards: np.ndarray
-    terminated: bool
-    truncated: bool
-    failure: str = ""
-
-    @property
-    def score(self) -> float:
-        """Sum of rewards, 0 to 20."""
-        return 0.0 if self.failure else float(self.rewards.sum())
-
-    @property
-    def success(self) -> bool:
-        """True where the bottle was held up for the whole countdown."""
-        return self.score == task.SUCCESS
 
 
 class AgentError(ValueError):

@@ -10,9 +10,10 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench import lessons, methods, records, splits, training, weights
+from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.learning import Heir, Learner
 from dextron_bench.methods import Entrant
-from dextron_bench.rollout import Agent, Episode, Privileged, blaming, rollout
+from dextron_bench.rollout import Agent, Privileged, blaming, rollout
 from dextron_bench.world import sources
 from dextron_bench.world.setting import Source
 
@@ -86,7 +87,7 @@ def learn(
 def execute(plan: Plan, runs: Path, threads: int = 0, report: Report = quiet) -> Path:
     """Evaluates what the folder does not hold yet; returns the folder, with its `result.json`.
 
-    `report` is told (episodes done, episodes in all) of each split. Raises RunMismatch, DamagedRun,
+    `report` is told (episodes done, episodes in all) of each split. Raises FolderMismatch, DamagedFile,
     UnknownMethod, UnknownSplit, MissingData, AgentError.
     """
     method = plan.make()

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from dextron_bench import gallery, methods, provenance, restoration, splits
+from dextron_bench import gallery, methods, restoration, splits
 from dextron_bench.replay import replay
+from dextron_bench.storage import atomic
 from dextron_bench.success import explanation, network
 from dextron_bench.success.explanation import EXPERT, Foresight
 from dextron_bench.world import sources
@@ -22,7 +23,7 @@ def choose(runs: Path, reaches: Sequence[str], split: str, rows: int) -> pd.Data
     """The chosen ones of the first rows of a split that runs played, each with its `name`.
 
     Each method is shown on the first of the sources of reaches that it played, at its lowest seed. Raises
-    NothingToView, DamagedRun, MissingData.
+    NothingToView, DamagedFile, MissingData.
     """
     table = gallery.episodes([runs])
     table = table.assign(actions=table.get("actions"))  # Runs of earlier versions kept none.
@@ -43,7 +44,7 @@ def make(chosen: pd.DataFrame, into: Path) -> list[Path]:
     """Copies the recordings of chosen episodes, made where they are missing, to `<name>.rrd` in a folder."""
     files = [into / f"{name}.rrd" for name in chosen["name"]]
     for file, recorded in zip(files, restoration.restore(chosen), strict=True):
-        provenance.write_whole(file, lambda part, recorded=recorded: shutil.copyfile(recorded, part))
+        atomic.write_atomically(file, lambda part, recorded=recorded: shutil.copyfile(recorded, part))
     return files
 
 

@@ -37,7 +37,7 @@ class Side:
 def find(name: str, runs: Path) -> Results:
     """One method's results: by its label in a folder of runs, else among the published ones, else by a path.
 
-    A path is a `result.json`, a run's folder, or the folder of a method's runs. Raises UnknownResult, DamagedRun.
+    A path is a `result.json`, a run's folder, or the folder of a method's runs. Raises UnknownResult, DamagedFile.
     """
     files: list[Path] = []
     if methods.NAME.fullmatch(name):

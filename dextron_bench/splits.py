@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench import provenance
-from dextron_bench.experts import Expert
-from dextron_bench.rollout import Case
+from dextron_bench.experts import Case, Expert
+from dextron_bench.storage import hashing
 from dextron_bench.world import setting
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
@@ -104,7 +103,7 @@ def cases(rows: pd.DataFrame) -> list[Case]:
 def digest(rows: pd.DataFrame) -> str:
     """SHA-256 of a split's rows in order: names as UTF-8, numbers as little-endian float64."""
     names = "\n".join(rows["reach"]).encode()
-    return provenance.digest(names, *(np.ascontiguousarray(rows[c], "<f8").tobytes() for c in NUMBERS))
+    return hashing.digest(names, *(np.ascontiguousarray(rows[c], "<f8").tobytes() for c in NUMBERS))
 
 
 @cache

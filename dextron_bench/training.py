@@ -15,12 +15,13 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from dextron_bench import entrants, methods, provenance, records
+from dextron_bench import entrants, methods, records
 from dextron_bench.checkpoints import Checkpoints, Progress
 from dextron_bench.curve import FINALISTS, Curve
 from dextron_bench.learning import Learner, Track, Trainer
 from dextron_bench.rollout import AgentError, blaming
 from dextron_bench.splits import Split
+from dextron_bench.storage import hashing
 from dextron_bench.world import model
 
 TIMING = "timing.jsonl"
@@ -54,7 +55,7 @@ def train(
 ) -> Checkpoints:
     """Trains, or goes on training, until all epochs are done and the best snapshot of each seed is known.
 
-    Raises Diverged, AgentError, Busy, RunMismatch, DamagedRun.
+    Raises Diverged, AgentError, Busy, FolderMismatch, DamagedFile.
     """
     done = Checkpoints(folder, seeds)
     curve = Curve(learner, done, track.source, val, track.threads)
@@ -78,7 +79,7 @@ def config(learner: Learner, track: Track, seeds: Sequence[int]) -> dict[str, An
         "code": entrants.origin(type(learner)),
         "settings": methods.settings(learner),
         "seeds": list(seeds),
-        "cases": provenance.digest(repr(list(track.cases)).encode()),
+        "cases": hashing.digest(repr(list(track.cases)).encode()),
         "physics": model.mjcf_hash(),
     }
 

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench import methods, provenance, tensors
+from dextron_bench import methods
 from dextron_bench.learning import Learner
-from dextron_bench.records import RunMismatch
 from dextron_bench.rollout import Agent, AgentError, blaming
+from dextron_bench.storage import atomic, hashing, tensors
+from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.world import model
 
 FILE = "weights.safetensors"  # In a run's folder.
@@ -54,7 +55,7 @@ def everything(reaches: str) -> list[Path]:
 def about(file: Path) -> dict[str, Any]:
     """What a file's weights come from, and the SHA-256 of the file; raises BadTensors, OSError."""
     found = tensors.read_about(file)
-    return {**{name: found[name] for name in TOLD if name in found}, "sha256": tensors.sha256(file)}
+    return {**{name: found[name] for name in TOLD if name in found}, "sha256": hashing.sha256(file)}
 
 
 def seed(file: Path) -> int:
@@ -98,12 +99,14 @@ def own(file: Path) -> Agent:
 
 
 def adopt(file: Path, folder: Path) -> Path:
-    """Copies weights into a run's folder, or checks that they are those there; raises RunMismatch."""
+    """Copies weights into a run's folder, or checks that they are those there; raises FolderMismatch."""
     own = folder / FILE
     if not own.exists():
-        provenance.write_whole(own, lambda part: shutil.copyfile(file, part))
-    if tensors.sha256(own) != tensors.sha256(file):
-        raise RunMismatch(f"{folder} holds a run with other weights; remove it, or choose another folder with --runs")
+        atomic.write_atomically(own, lambda part: shutil.copyfile(file, part))
+    if hashing.sha256(own) != hashing.sha256(file):
+        raise FolderMismatch(
+            f"{folder} holds a run with other weights; remove it, or choose another folder with --runs"
+        )
     return own
 
 

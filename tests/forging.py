@@ -16,6 +16,7 @@ import tiny
 
 from dextron_bench import records
 from dextron_bench.isolation.agent import Limits
+from dextron_bench.storage import hashing
 from dextron_bench.submission import bundle, contest, verification
 from dextron_bench.submission.verdict import Verdict
 
@@ -72,7 +73,7 @@ class Forgery:
         """What verification finds after all hashes were made right."""
         manifest = json.loads((self.folder / bundle.MANIFEST).read_text())
         names = {str(each.relative_to(self.folder)): each for each in self.folder.rglob("*") if each.is_file()}
-        hashes = {name: bundle.sha256(each) for name, each in names.items() if name != bundle.MANIFEST}
+        hashes = {name: hashing.sha256(each) for name, each in names.items() if name != bundle.MANIFEST}
         file = self.folder.with_suffix(".zip")
         with zipfile.ZipFile(file, "w") as archive:
             archive.writestr(bundle.MANIFEST, json.dumps(manifest | {"files": hashes}))

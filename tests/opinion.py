@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dextron_bench import tensors
+from dextron_bench.storage import tensors
 from dextron_bench.success.network import SIZES, SuccessModel
 
 

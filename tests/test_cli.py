@@ -15,8 +15,9 @@ import pandas as pd
 import pytest
 import tiny
 
-from dextron_bench import cli, provenance
+from dextron_bench import cli
 from dextron_bench.records import read_result
+from dextron_bench.storage import atomic
 
 AGENT = """
 import numpy as np
@@ -160,7 +161,7 @@ def test_a_file_where_the_folder_should_be_is_one_line(here: Path, complaint: Ca
 def test_a_full_disk_is_one_line_and_leaves_nothing_half(
     here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]
 ):
-    write_whole = provenance.write_whole
+    write_whole = atomic.write_atomically
 
     def full(file: Path, write: Callable[[Path], object]) -> None:
         def fill(part: Path) -> None:
@@ -170,7 +171,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_half(
 
         write_whole(file, fill if file.name == "episodes.parquet" else write)
 
-    monkeypatch.setattr(provenance, "write_whole", full)
+    monkeypatch.setattr(atomic, "write_atomically", full)
     line = complaint(*run("nothing"))
     assert "No space left on device: runs/nothing/synthetic/seed0/episodes.parquet" in line
     assert sorted(os.listdir("runs/nothing/synthetic/seed0")) == ["config.json", "provenance.json"]

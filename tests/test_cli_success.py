@@ -11,7 +11,8 @@ import pytest
 import tiny
 import toy_world
 
-from dextron_bench import cli, tensors
+from dextron_bench import cli
+from dextron_bench.storage import tensors
 from dextron_bench.success import collection, fit
 
 

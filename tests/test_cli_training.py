@@ -19,7 +19,8 @@ import toy_world
 from safetensors.numpy import save_file
 from toy_world import HEIR, HOMELY, TOY
 
-from dextron_bench import cli, tensors
+from dextron_bench import cli
+from dextron_bench.storage import hashing, tensors
 from dextron_bench.verbs.settings import in_a_line
 from dextron_bench.world import model
 
@@ -59,7 +60,7 @@ def test_a_run_trains_all_seeds_together_and_says_so(here: Path, capsys: pytest.
     result = json.loads((base / "seed1" / "result.json").read_text())
     told = result["training"]
     assert (told["seeds"], told["epochs"], told["best_epoch"], told["frames"]) == ([0, 1], 2, 2, 40)
-    assert told["sha256"] == tensors.sha256(base / "seed1" / "weights.safetensors")
+    assert told["sha256"] == hashing.sha256(base / "seed1" / "weights.safetensors")
     assert [point["epoch"] for point in json.loads((base / "seed1" / "curve.json").read_text())["points"]] == [2]
     assert cli.main(["list"]) == 0
     assert "toy-0.3" in capsys.readouterr().out

@@ -7,9 +7,9 @@ from brief import SETTINGS, SOURCE
 
 from baselines import demonstrations
 from baselines.demonstrations import Demonstrations
-from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench.experts import Case, Expert, ExpertAgent
 from dextron_bench.learning import Track
-from dextron_bench.rollout import Case, rollout
+from dextron_bench.rollout import rollout
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS[:3]]
 

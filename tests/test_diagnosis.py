@@ -10,8 +10,9 @@ import pytest
 
 from dextron_bench import diagnosis
 from dextron_bench.diagnosis import closing, diagnose, expert_closing, touch
-from dextron_bench.experts import Expert, ExpertAgent
-from dextron_bench.rollout import Case, Episode, rollout
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts import Case, Expert, ExpertAgent
+from dextron_bench.rollout import rollout
 from dextron_bench.world import model, task
 from dextron_bench.world.minjerk import MinjerkSource
 from dextron_bench.world.reach import PALM_CENTRE

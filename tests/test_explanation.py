@@ -9,9 +9,9 @@ import pytest
 
 from dextron_bench import figures
 from dextron_bench.diagnosis import Diagnosis
-from dextron_bench.rollout import Episode
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import Insight
 from dextron_bench.success.explanation import KINDS, Foresight, choose
-from dextron_bench.success.insight import Insight
 from dextron_bench.success.network import GRID
 from dextron_bench.world.setting import Setting
 
@@ -23,7 +23,7 @@ def seen(player: str, cause: str, best: list[float], own: list[float]) -> Foresi
     curves[:, -1] = best
     rewards = np.full(steps, 20.0 / steps if cause == "solved" else 0.0)
     episode = Episode(Setting("a", 0, 0, 0), np.zeros((steps + 1, 48)), np.zeros((steps, 1)), rewards, False, True)
-    insight = Insight(curves, np.array(own), np.zeros(steps), duration=steps)
+    insight = Insight(GRID, curves, np.array(own), np.zeros(steps), duration=steps)
     return Foresight(player, episode, Diagnosis(cause, 0.0), insight)
 
 

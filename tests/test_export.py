@@ -15,10 +15,11 @@ import toy_world
 from brief import SETTINGS, SOURCE
 
 from baselines.floors import Nothing
-from dextron_bench import cli, export, tensors
-from dextron_bench.experts import Expert, ExpertAgent
-from dextron_bench.rollout import Case, rollout
+from dextron_bench import cli, export
+from dextron_bench.experts import Case, Expert, ExpertAgent
+from dextron_bench.rollout import rollout
 from dextron_bench.splits import Split
+from dextron_bench.storage import hashing
 from dextron_bench.world.gym import GraspEnv
 from dextron_bench.world.setting import Setting
 
@@ -187,5 +188,5 @@ def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], c
     assert cli.main([*words, "--weights", weights, "--rows", "1", "--author", "A. Person"]) == 0
     about = minari.MinariDataset("sets/dextron/synthetic-test-policies-v0/data").storage.metadata
     assert about["author"] == {"A. Person"}
-    assert about["dextron_bench"]["players"][0]["sha256"] == tensors.sha256(here / weights)
+    assert about["dextron_bench"]["players"][0]["sha256"] == hashing.sha256(here / weights)
     assert about["dextron_bench"]["split"]["rows"] == 1

@@ -11,10 +11,12 @@ from brief import SETTINGS, SOURCE
 from rerun.chunk import RrdReader
 
 from dextron_bench import recording
-from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import Insight, expert_actions
+from dextron_bench.experts import Case, Expert, ExpertAgent
 from dextron_bench.recording import foresight, scene
-from dextron_bench.rollout import Case, Episode, rollout
-from dextron_bench.success.insight import Insight, expert_actions
+from dextron_bench.rollout import rollout
+from dextron_bench.success.network import GRID
 from dextron_bench.world import model
 from dextron_bench.world.setting import Setting
 
@@ -27,7 +29,7 @@ def noise(steps: int) -> tuple[Episode, Insight]:
     states = np.concatenate([model.half_closed(), np.zeros(23)]) + rng.normal(0.0, 0.01, (steps + 1, model.STATE))
     episode = Episode(SETTING, states, rng.uniform(-1, 1, (steps, 1)), np.zeros(steps), False, True)
     curves, chances, experts = rng.random((steps, 51)), rng.random(steps), rng.uniform(-1, 1, steps)
-    return episode, Insight(curves, chances, experts, duration=steps - 20.0)
+    return episode, Insight(GRID, curves, chances, experts, duration=steps - 20.0)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +67,7 @@ def test_curves_chances_and_actions_come_back(columns: dict[str, pa.RecordBatch]
 def test_a_changed_curve_is_noticed(tmp_path: Path):
     """The digest covers what the model thought: the same episode with another thought is another content."""
     episode, insight = noise(3)
-    changed = Insight(insight.curves.copy(), insight.chances, insight.experts, insight.duration)
+    changed = Insight(GRID, insight.curves.copy(), insight.chances, insight.experts, insight.duration)
     changed.curves[1, 7] += 0.25
     told = []
     for each in (insight, changed):
@@ -78,7 +80,7 @@ def test_a_changed_curve_is_noticed(tmp_path: Path):
 def test_ridges_rise_step_by_step_and_are_green_where_the_outcome_is_foretold():
     curves = np.zeros((2, 3))
     curves[1] = [0.0, 1.0, 0.5]
-    seen = Insight(curves, np.array([0.2, 0.9]), np.zeros(2), duration=2.0)
+    seen = Insight(GRID, curves, np.array([0.2, 0.9]), np.zeros(2), duration=2.0)
     chunks = list(foresight.ridge(seen, np.array([-1.0, 0.5]), last=1, success=True))
     ridge = next(chunk for chunk in chunks if chunk.entity_path == "/ridge/curves").to_record_batch().to_pydict()
     strips, colours = ridge["LineStrips2D:strips"][0], ridge["LineStrips2D:colors"][0]

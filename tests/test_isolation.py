@@ -20,9 +20,11 @@ from hypothesis import strategies as st
 from tiny import ROWS
 
 from dextron_bench import splits
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts import Case
 from dextron_bench.isolation import policies, sandbox, wire
 from dextron_bench.isolation.agent import Isolated, Limits, launch
-from dextron_bench.rollout import AgentError, Case, Episode, rollout
+from dextron_bench.rollout import AgentError, rollout
 
 CASES: list[Case] = splits.cases(ROWS[:3])
 AGENT = """

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dextron_bench import experts
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.minjerk import Draw, MinjerkSource, band, carrier, leg
+from dextron_bench.world.minjerk import LIFT_STEPS, REACH_STEPS, Draw, MinjerkSource, band, carrier, leg
 from dextron_bench.world.reach import ReachError, palm_centre
 from dextron_bench.world.setting import Setting, UnknownReach
 from dextron_bench.world.sources import open_source
@@ -124,3 +124,8 @@ def test_the_papers_expert_lifts_the_bottle():
         closing = experts.closes(task.distance(step.states), first, critical)
         actions = experts.law(task.closure(step.states), closing, gain)
     assert scores.tolist() == [task.SUCCESS] * 3
+
+
+def test_reach_and_lift_take_a_half_and_a_third_of_an_episode():
+    """The world is not imported by the reaches, so its limit of 500 steps stands in two places."""
+    assert (REACH_STEPS, LIFT_STEPS) == (task.STEP_LIMIT // 2, task.STEP_LIMIT // 3)

@@ -15,6 +15,7 @@ from brief import SOURCE
 from dextron_bench import blocks, experts, montecarlo, rollout
 from dextron_bench.blocks import Tally
 from dextron_bench.montecarlo import Search, Share
+from dextron_bench.storage import folder_config
 from dextron_bench.world import setting
 from dextron_bench.world.engine import Engine
 
@@ -60,7 +61,7 @@ def test_rows_are_the_same_at_any_slots_and_threads_in_shares_and_after_interrup
 def test_outcomes_are_those_of_a_naive_search(tmp_path):
     found = search(tmp_path, rows=2)
     agents = [experts.Expert(gain, critical) for gain, critical in zip(found["gain"], found["critical"], strict=True)]
-    cases = [rollout.Case(s, e, 0.0) for s, e in zip(setting.from_frame(found), agents, strict=True)]
+    cases = [experts.Case(s, e, 0.0) for s, e in zip(setting.from_frame(found), agents, strict=True)]
     played = dict(rollout.rollout(experts.ExpertAgent(), SOURCE, cases, threads=1))
     assert found["score"].tolist() == [played[i].score for i in range(len(cases))]
     assert found["length"].tolist() == [len(played[i].actions) for i in range(len(cases))]
@@ -81,13 +82,13 @@ def test_a_search_goes_on_from_what_a_database_kept(tmp_path):
     montecarlo.restore(SOURCE, SMALL, tmp_path / "second", kept(first), count)
     whole = search(tmp_path / "first", rows=3)
     pd.testing.assert_frame_equal(kept(search(tmp_path / "second", rows=3)), kept(whole))
-    with pytest.raises(blocks.SearchMismatch, match="row 0 of the database"):
+    with pytest.raises(folder_config.FolderMismatch, match="row 0 of the database"):
         montecarlo.restore(SOURCE, Search("brief", 4, 3, 4), tmp_path / "other", kept(first), count)
 
 
 def test_a_folder_holds_one_search(tmp_path):
     search(tmp_path, rows=1)
-    with pytest.raises(blocks.SearchMismatch, match="holds another search"):
+    with pytest.raises(folder_config.FolderMismatch, match="holds another search"):
         montecarlo.run(SOURCE, Search("brief", seed=4, experts=3, block=4), tmp_path, 1, Engine(12, 1))
 
 

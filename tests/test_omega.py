@@ -12,7 +12,8 @@ import pytest
 import tiny
 
 from baselines.omega import BadRule, NoModel, Omega, OmegaAgent, choose
-from dextron_bench import cli, methods, tensors
+from dextron_bench import cli, methods
+from dextron_bench.storage import hashing
 from dextron_bench.success.network import GRID, SuccessModel
 
 
@@ -112,12 +113,12 @@ def test_it_acts_the_same_at_any_batch_size():
 def test_it_says_which_model_it_acts_with_and_refuses_another(tmp_path: Path):
     file = opinion.write(tmp_path / "model.safetensors", 0.4)
     made = Omega(model=str(file)).made_for("real")
-    assert made == Omega(model=str(file), sha256=tensors.sha256(file))
+    assert made == Omega(model=str(file), sha256=hashing.sha256(file))
     again = methods.create("omega", methods.settings(made))
     assert again == made
     np.testing.assert_allclose(made.agent(0).act(states(0.05)), 0.4)
     opinion.write(file, -0.4)
-    with pytest.raises(NoModel, match=f"has the SHA-256 {tensors.sha256(file)}, not {made.sha256}"):
+    with pytest.raises(NoModel, match=f"has the SHA-256 {hashing.sha256(file)}, not {made.sha256}"):
         made.agent(0)
 
 
@@ -137,7 +138,7 @@ def test_what_it_cannot_act_with_is_told(tmp_path: Path):
 def test_a_method_is_made_for_the_reaches_of_its_run(tmp_path: Path):
     file = opinion.write(tmp_path / "model.safetensors", 0.4)
     made = methods.create("omega", {"model": str(file)}, "real")
-    assert methods.settings(made)["sha256"] == tensors.sha256(file)
+    assert methods.settings(made)["sha256"] == hashing.sha256(file)
     assert methods.create("exp", {}, "real") == methods.create("exp")
     with pytest.raises(methods.BadSettings, match="'omega': no success model at hand"):
         methods.create("omega", {}, "minjerk")
@@ -161,7 +162,7 @@ def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], c
     assert cli.main([*words, "--model", "model.safetensors", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)[0]["method"] == "omega"
     config = json.loads((here / "runs/omega/synthetic/seed0/config.json").read_text())
-    assert config["settings"] == methods.settings(Omega(model="model.safetensors", sha256=tensors.sha256(file)))
+    assert config["settings"] == methods.settings(Omega(model="model.safetensors", sha256=hashing.sha256(file)))
     opinion.write(file, -0.4)
     assert "holds a run with other settings" in complaint(*words, "--model", "model.safetensors")
     assert "has no weights" in complaint("eval", "--method", "omega", "--model", "model.safetensors")

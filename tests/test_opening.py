@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dextron_bench import opening, rollout
+from dextron_bench import experts, opening, rollout
 from dextron_bench.experts import Expert, ExpertAgent
 from dextron_bench.world.engine import Engine
 from dextron_bench.world.minjerk import MinjerkSource
@@ -24,7 +24,7 @@ def ask(numbers: range, criticals: np.ndarray, slots: int, threads: int = 1) -> 
 def alone() -> tuple[np.ndarray, np.ndarray]:
     """Returns and lengths (2, 5) of the same experts played one by one."""
     settings = [SOURCE.sample(np.random.default_rng(number)) for number in range(2)]
-    cases = [rollout.Case(each, Expert(2.0, float(critical)), 0.0) for each in settings for critical in CRITICALS]
+    cases = [experts.Case(each, Expert(2.0, float(critical)), 0.0) for each in settings for critical in CRITICALS]
     played = dict(rollout.rollout(ExpertAgent(), SOURCE, cases, threads=1))
     scores = np.array([played[i].score for i in range(len(cases))])
     lengths = np.array([len(played[i].actions) for i in range(len(cases))])

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import baselines
-from dextron_bench import cli, lessons, methods, records, rollout, splits, tensors, weights
+from dextron_bench import cli, lessons, methods, records, rollout, splits, weights
 from dextron_bench.learning import Learner
+from dextron_bench.storage import atomic, tensors
 from dextron_bench.world.setting import Source
 
 BOARD = Path(__file__).parents[1] / "leaderboard"
@@ -49,7 +50,7 @@ def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
 def test_weights_that_ship_are_those_of_the_result(file: Path):
     result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
     assert result["training"].items() >= weights.about(file).items()
-    points = records.read_json(BOARD / "results" / name(file) / lessons.CURVE)["points"]
+    points = atomic.read_json(BOARD / "results" / name(file) / lessons.CURVE)["points"]
     assert result["training"]["best_epoch"] in [point["epoch"] for point in points]
 
 

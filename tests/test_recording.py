@@ -19,9 +19,10 @@ from hypothesis import strategies as st
 from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench import recording
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import Insight
 from dextron_bench.recording import archive, layout, scene, storage
-from dextron_bench.rollout import Episode
-from dextron_bench.success.insight import Insight
+from dextron_bench.success.network import GRID
 from dextron_bench.world import model, reach, task
 from dextron_bench.world.setting import Setting
 
@@ -213,7 +214,7 @@ def test_other_layouts_are_those_of_other_applications(tmp_path: Path) -> None:
     """The viewer has one layout an application: that of the last file it was given."""
     files = [tmp_path / name for name in ("plain.rrd", "foretold.rrd", "pair.rrd")]
     recording.write(files[0], episode(2), PATH, {})
-    recording.write(files[1], episode(2), PATH, {}, Insight(np.full((2, 51), 0.5), np.zeros(2), np.zeros(2), 2.0))
+    recording.write(files[1], episode(2), PATH, {}, Insight(GRID, np.full((2, 51), 0.5), np.zeros(2), np.zeros(2), 2.0))
     recording.pair(files[2], *files[:2])
     found = [RrdReader(file).recordings()[0].application_id for file in files]
     assert found == ["dextron-bench-plain", "dextron-bench", "dextron-bench-pairs"]

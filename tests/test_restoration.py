@@ -16,6 +16,7 @@ from dextron_bench import gallery, records, restoration, run
 from dextron_bench.gallery import Wish
 from dextron_bench.restoration import Unplayable
 from dextron_bench.run import Plan
+from dextron_bench.storage import atomic
 
 ALL = Wish(worst=9)
 LATE = """
@@ -144,5 +145,5 @@ def test_a_run_under_way_is_called_after_its_folder(tmp_path: Path):
     (folder / records.RESULT).unlink()
     assert gallery.whose(folder) == {"method": "exp", "reaches": "synthetic", "seed": 2}
     (folder / records.CONFIG).write_text("{}")
-    with pytest.raises(records.DamagedRun, match="it lacks 'reaches'"):
+    with pytest.raises(atomic.DamagedFile, match="it lacks 'reaches'"):
         gallery.whose(folder)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from dextron_bench.experts import Expert, ExpertAgent
-from dextron_bench.rollout import AgentError, Case, Episode, fault, rollout
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts import Case, Expert, ExpertAgent
+from dextron_bench.rollout import AgentError, fault, rollout
 from dextron_bench.world.minjerk import MinjerkSource
 from dextron_bench.world.setting import Setting
 

@@ -14,12 +14,14 @@ import pytest
 import tiny
 from brief import SETTINGS, SOURCE
 
-from dextron_bench import provenance, recording, records, run, splits
+from dextron_bench import recording, records, run, splits
 from dextron_bench.experts import ExpertAgent
-from dextron_bench.records import DamagedRun, RunMismatch
 from dextron_bench.replay import replay
 from dextron_bench.rollout import rollout
 from dextron_bench.run import Plan
+from dextron_bench.storage import atomic, provenance
+from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.world.setting import from_frame
 
 PLAN = Plan("exp", "synthetic", ("val", "test"), seed=0)
@@ -39,7 +41,7 @@ class Mine:
 def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Tiny splits of short reaches; and a provenance that no one's commit changes meanwhile."""
     tiny.install(tiny.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.setattr(provenance, "collect", lambda: {"git": "abc"})
+    monkeypatch.setattr(provenance, "collect", lambda physics: {"git": "abc"})
     yield
     tiny.forget()
 
@@ -101,9 +103,9 @@ def test_killed_between_its_first_two_files_it_still_ends(tmp_path: Path, monkey
         written.append(file)
         write_json(file, value)
 
-    write_json = provenance.write_json
+    write_json = atomic.write_json
     with monkeypatch.context() as patched:
-        patched.setattr(provenance, "write_json", once)
+        patched.setattr(atomic, "write_json", once)
         with pytest.raises(KeyboardInterrupt):
             play(tmp_path)
     assert (play(tmp_path) / "result.json").exists()
@@ -198,7 +200,7 @@ def test_other_code_in_the_same_folder_is_a_mismatch(tmp_path: Path):
     plan = Plan(spec, "synthetic", ("open",), 0)
     play(tmp_path, plan)
     agent(tmp_path, "0.5")
-    with pytest.raises(RunMismatch, match=r"mine/synthetic/seed0 holds a run with other code; remove it, or choose"):
+    with pytest.raises(FolderMismatch, match=r"mine/synthetic/seed0 holds a run with other code; remove it, or choose"):
         play(tmp_path, plan)
 
 
@@ -206,7 +208,7 @@ def test_a_name_that_another_method_has_is_a_mismatch(tmp_path: Path):
     play(tmp_path, Plan("nothing", "synthetic", ("open",), 0))
     thief = tmp_path / "thief.py"
     thief.write_text(AGENT.format(value=0.0).replace('"mine"', '"nothing"'))
-    with pytest.raises(RunMismatch, match="other code"):
+    with pytest.raises(FolderMismatch, match="other code"):
         play(tmp_path, Plan(f"{thief}:Mine", "synthetic", ("open",), 0))
 
 
@@ -214,7 +216,7 @@ def test_other_physics_in_the_same_folder_is_a_mismatch(tmp_path: Path):
     plan = Plan("nothing", "synthetic", ("open",), 0)
     config = play(tmp_path, plan) / "config.json"
     config.write_text(json.dumps(json.loads(config.read_text()) | {"physics": "other"}))
-    with pytest.raises(RunMismatch, match="other physics"):
+    with pytest.raises(FolderMismatch, match="other physics"):
         play(tmp_path, plan)
 
 
@@ -223,7 +225,7 @@ def test_a_damaged_file_is_named_with_what_to_do(tmp_path: Path, file: str):
     plan = Plan("nothing", "synthetic", ("open",), 0)
     place = play(tmp_path, plan) / file
     place.write_bytes(place.read_bytes()[:10])
-    with pytest.raises(DamagedRun) as caught:
+    with pytest.raises(DamagedFile) as caught:
         play(tmp_path, plan)
     assert str(caught.value).startswith(f"{place} is damaged (")
     assert str(caught.value).endswith("; remove it and run again")
@@ -251,7 +253,7 @@ def test_a_damaged_result_is_named(tmp_path: Path, text: str):
     place.write_text(json.dumps(RESULT))
     assert list(records.results(tmp_path)) == [RESULT]
     place.write_text(text)
-    with pytest.raises(DamagedRun, match=r"result\.json is damaged"):
+    with pytest.raises(DamagedFile, match=r"result\.json is damaged"):
         list(records.results(tmp_path))
 
 

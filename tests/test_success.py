@@ -14,9 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.floors import Nothing
-from dextron_bench import blocks, records, tensors
-from dextron_bench.experts import Expert
-from dextron_bench.rollout import Case
+from dextron_bench.experts import Case, Expert
+from dextron_bench.storage import folder_config, tensors
 from dextron_bench.success import judgement
 from dextron_bench.success.collection import POLICY, SOLVED, UNIFORM, BadCollection, Collection, Tally, collect, draw
 from dextron_bench.success.collection import file_of as block_file
@@ -82,7 +81,7 @@ def test_a_block_holds_what_was_played(tmp_path: Path):
 
 def test_another_data_set_in_the_folder_is_told(tmp_path: Path):
     gather(tmp_path, 1)
-    with pytest.raises(blocks.SearchMismatch, match="choose another folder"):
+    with pytest.raises(folder_config.FolderMismatch, match="choose another folder"):
         gather(tmp_path, 1, Collection("synthetic", seed=1, block=5))
     with pytest.raises(BadCollection, match="at least 5 episodes"):
         Collection(block=0)
@@ -210,7 +209,7 @@ def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
     fit(tmp_path / "c", replace(BRIEF, epochs=1))
     fit(tmp_path / "c", BRIEF)
     assert contents(tmp_path / "a") == contents(tmp_path / "c")
-    with pytest.raises(records.RunMismatch, match="holds another training"):
+    with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
         fit(tmp_path / "c", replace(BRIEF, epochs=1))
 
     def stop(done: int, wanted: int, note: str) -> None:
@@ -225,7 +224,7 @@ def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
     assert [point["epoch"] for point in told["curve"]] == [1, 2]
     losses = [point["test_loss"] for point in told["curve"]]
     assert losses[told["best_epoch"] - 1] == min(losses)
-    with pytest.raises(records.RunMismatch, match="holds another training"):
+    with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
         fit(tmp_path / "a", Fit(epochs=2, updates=4, batch=8))
     with pytest.raises(BadFit, match="positive"):
         Fit(updates=0)

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dextron_bench.world import rotation, synthetic, synthetic_fit
-from dextron_bench.world.reach import SETTLE, STEP, Reach, palm_centre, path
+from dextron_bench.world.reach import CONTROL_STEP, SETTLE, Reach, palm_centre, path
 from dextron_bench.world.setting import Stratum, UnknownReach
 from dextron_bench.world.sources import open_source
 from dextron_bench.world.synthetic_encode import encode, log_stretches
@@ -94,7 +94,7 @@ def test_every_path_passes_the_bottle_with_its_offset(number: int, noise: float,
     if 2.5 * reach.duration + 0.5 + 0.8 * noise < reach.duration:
         return
     made = path(reach, x, 0.01, noise)
-    steps, arrived = np.arange(len(made)) * STEP, reach.reached * (2.5 + (0.5 + 0.8 * noise) / reach.duration)
+    steps, arrived = np.arange(len(made)) * CONTROL_STEP, reach.reached * (2.5 + (0.5 + 0.8 * noise) / reach.duration)
     settled = (steps >= arrived) & (steps < arrived + SETTLE)
     pose = made.positions[settled].mean(axis=0), rotation.mean(made.quaternions[settled])
     np.testing.assert_allclose(palm_centre(*pose)[:2], [x, 0.01], atol=1e-7)

@@ -15,11 +15,13 @@ import tiny
 import toy_world
 from toy_learner import Linear, Toy, ToyTrainer
 
-from dextron_bench import curve, provenance, splits, tensors, training
+from dextron_bench import curve, splits, training
 from dextron_bench.checkpoints import Busy, Checkpoints
 from dextron_bench.learning import Heir, Learner, Track
-from dextron_bench.records import DamagedRun, RunMismatch
 from dextron_bench.rollout import AgentError
+from dextron_bench.storage import atomic, provenance, tensors
+from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.training import Diverged
 
 QUICK = Toy(preset="quick")  # 5 epochs, checkpoints after 2, 4 and 5.
@@ -40,7 +42,7 @@ def score(agent: Linear, source: object, cases: list, **_: object) -> Iterator[t
 def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Tiny splits, scores that cost nothing, and a provenance that no one's commit changes meanwhile."""
     toy_world.install(toy_world.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.setattr(provenance, "collect", lambda: {"git": "abc"})
+    monkeypatch.setattr(provenance, "collect", lambda physics: {"git": "abc"})
     monkeypatch.setattr(curve, "rollout", score)
     monkeypatch.setattr(os, "fsync", lambda descriptor: None)
     yield
@@ -89,7 +91,7 @@ def test_cut_off_before_and_after_every_write_it_ends_with_the_same_bytes(
 ):
     train(tmp_path / "whole")
     whole = toy_world.contents(tmp_path / "whole")
-    write_whole = provenance.write_whole
+    write_whole = atomic.write_atomically
     writes = 0
     for writes in range(1000):
         folder, left = tmp_path / f"cut{writes}", [writes]
@@ -105,7 +107,7 @@ def test_cut_off_before_and_after_every_write_it_ends_with_the_same_bytes(
                 raise Killed
 
         with monkeypatch.context() as patched:
-            patched.setattr(provenance, "write_whole", cut)
+            patched.setattr(atomic, "write_atomically", cut)
             try:
                 train(folder)
                 break
@@ -155,7 +157,7 @@ def test_of_equal_snapshots_the_later_is_the_best(tmp_path: Path, monkeypatch: p
 
 def write_scores(done: Checkpoints, epoch: int, rows: int, scores: list[float]) -> None:
     file = done.snapshot(epoch, 0).with_name(f"seed0-val{rows}.json")
-    provenance.write_json(file, {"digest": splits.load("synthetic", "val").digest, "scores": scores})
+    atomic.write_json(file, {"digest": splits.load("synthetic", "val").digest, "scores": scores})
 
 
 def test_scores_on_another_version_of_val_do_not_count(tmp_path: Path):
@@ -203,7 +205,7 @@ def test_damage_is_named_with_what_to_do(tmp_path: Path, name: str):
     folder = half_done(tmp_path / "a")
     file = folder / name
     file.write_bytes(file.read_bytes()[: 20 if name != "checkpoint.safetensors" else -20])
-    with pytest.raises(DamagedRun, match=r"is damaged .*; remove it and run again") as caught:
+    with pytest.raises(DamagedFile, match=r"is damaged .*; remove it and run again") as caught:
         train(folder, Toy(preset="quick", breaks=5))
     assert str(folder) in str(caught.value)
 
@@ -212,15 +214,15 @@ def test_a_damaged_snapshot_is_named(tmp_path: Path):
     done = train(tmp_path / "a")
     done.snapshot(2, 0).write_bytes(b"not weights")
     done.snapshot(2, 0).with_name("seed0-val1.json").unlink()
-    with pytest.raises(DamagedRun, match=r"epoch-0002/seed0\.safetensors is damaged"):
+    with pytest.raises(DamagedFile, match=r"epoch-0002/seed0\.safetensors is damaged"):
         train(tmp_path / "a")
 
 
 def test_other_settings_and_another_device_do_not_go_on(tmp_path: Path):
     folder = half_done(tmp_path / "a")
-    with pytest.raises(RunMismatch, match="holds a run with other settings"):
+    with pytest.raises(FolderMismatch, match="holds a run with other settings"):
         train(folder, Toy(preset="paper"))
-    with pytest.raises(RunMismatch, match="was begun on cpu: go on with --device cpu, or remove it"):
+    with pytest.raises(FolderMismatch, match="was begun on cpu: go on with --device cpu, or remove it"):
         train(folder, Toy(preset="quick", breaks=5), device="cuda")
 
 

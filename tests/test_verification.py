@@ -13,8 +13,9 @@ import pytest
 import tiny
 from forging import Forgery, row
 
-from dextron_bench import provenance, recording, records, splits
+from dextron_bench import recording, records, splits
 from dextron_bench.isolation.agent import Limits
+from dextron_bench.storage import provenance
 from dextron_bench.submission import contest, differences
 from dextron_bench.world import sources
 
@@ -192,9 +193,9 @@ def test_a_machine_is_of_the_same_platform_as_itself(monkeypatch: pytest.MonkeyP
     """On a Mac the name of the system has two forms."""
     monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
     monkeypatch.setattr("platform.system", lambda: "Darwin")
-    assert differences.same_platform(provenance.collect())
+    assert differences.same_platform(provenance.collect(""))
     monkeypatch.setattr("platform.platform", lambda *_: "Linux-6.1-x86_64")
-    here = provenance.collect()
+    here = provenance.collect("")
     monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
     assert not differences.same_platform(here)
 

@@ -14,8 +14,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from dextron_bench import entrants, tensors
+from dextron_bench import entrants
 from dextron_bench.isolation import guard, policies, wire
+from dextron_bench.storage import tensors
 
 GROUP = "dextron_bench.methods"
 

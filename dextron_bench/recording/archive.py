@@ -17,11 +17,11 @@ import pyarrow as pa
 import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import Insight
 from dextron_bench.recording import foresight, layout, scene, storage
 from dextron_bench.recording.digest import digest, lines
 from dextron_bench.recording.storage import APPLICATION
-from dextron_bench.rollout import Episode
-from dextron_bench.success.insight import Insight
 from dextron_bench.world import model, reach
 from dextron_bench.world.setting import Setting
 
@@ -59,7 +59,7 @@ def write(
     chunks = [*_chunks(episode, properties), scene.plan(path), *scene.chunks(episode.states)]
     if insight:
         last = len(episode.actions) - 1
-        chunks += [*foresight.looks(), *foresight.chunks(insight, episode.actions)]
+        chunks += [*foresight.looks(insight.grid), *foresight.chunks(insight, episode.actions)]
         chunks += foresight.ridge(insight, episode.actions[:, 0], last, episode.success)
     props, told = _props()
     identity = digest([*told, *lines(chunks)])

@@ -10,9 +10,8 @@ import rerun as rr
 from rerun.chunk import Chunk
 from rerun.encodings import TensorDataBatch
 
+from dextron_bench.evaluation.predictions import Insight
 from dextron_bench.recording import scene
-from dextron_bench.success.insight import Insight
-from dextron_bench.success.network import GRID
 
 RIDGES = 40  # Curves of the ridge plot, about.
 WIDTH, HEIGHT, RISE = 1.0, 5.0, 0.4  # Half the ridge plot's width, its height, and that of a curve of chance 1.
@@ -59,11 +58,11 @@ def ridge(insight: Insight, actions: np.ndarray, last: int, success: bool | None
     yield Chunk.from_columns("/ridge/now", when, rr.LineStrips2D.columns(strips=now))
 
 
-def looks() -> list[Chunk]:
-    """What is the same in every episode: colours, the bars' places, and two thin bars of height 1 as their scale."""
-    ends, places = [-1.1, 1.1], len(GRID)
+def looks(grid: np.ndarray) -> list[Chunk]:
+    """What all episodes share: colours, places of the bars on the grid (A,) of actions, and two bars of 1 as scale."""
+    ends, places = [-1.1, 1.1], len(grid)
     return [
-        _look("/success/curve", rr.BarChart(GRID, abscissa=GRID, widths=np.full(places, 0.036), color=BARS)),
+        _look("/success/curve", rr.BarChart(grid, abscissa=grid, widths=np.full(places, 0.036), color=BARS)),
         _look("/success/chosen", rr.BarChart([0.0], widths=[0.03], color=TICK), "abscissa"),
         scene.static("/ridge/now", rr.LineStrips2D.from_fields(colors=[NOW], radii=[0.008])),
         scene.static("/success/scale", rr.BarChart([1.0, 1.0], abscissa=ends, widths=[0.02, 0.02], color=FRAME)),

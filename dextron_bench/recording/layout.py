@@ -10,8 +10,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk
 
+from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.recording import foresight, scene
-from dextron_bench.rollout import Episode
 from dextron_bench.world import task
 
 EYE, TARGET = (0.66, -0.62, 0.40), (-0.07, -0.10, 0.20)  # [m] whence and whither the 3D view looks.

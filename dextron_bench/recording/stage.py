@@ -10,9 +10,9 @@ import numpy as np
 import rerun as rr
 from rerun_bindings import flush_and_cleanup_orphaned_recordings
 
+from dextron_bench.evaluation.predictions import Insight
 from dextron_bench.recording import foresight, layout, scene, viewer
 from dextron_bench.recording.storage import APPLICATION
-from dextron_bench.success.insight import Insight
 from dextron_bench.world import reach, task
 
 EVERY = 5  # Steps after which the ridge plot is drawn again.
@@ -31,7 +31,7 @@ class Stage:
         self._stream.send_blueprint(layout.blueprint(foretold=True, live=True))
         table = "\n".join(f"| {name} | {value} |" for name, value in about.items())
         text = rr.TextDocument(f"### Live\n\n| | |\n|---|---|\n{table}\n", media_type="text/markdown")
-        props = [*scene.props(), *layout.lines(), *foresight.looks(), scene.plan(path), scene.static("/card", text)]
+        props = [*scene.props(), *layout.lines(), scene.plan(path), scene.static("/card", text)]
         self._stream.send_chunks(props)
         self._last = min(len(path.positions) - 1 + task.HOLD, task.STEP_LIMIT)
 
@@ -39,9 +39,13 @@ class Stage:
         """Shows the last of the states (T, 48), actions (T, 1) and thoughts of an episode so far."""
         now = len(states) - 1
         before = max(now - 1, 0)
-        part = Insight(insight.curves[now:], insight.chances[now:], insight.experts[now:], insight.duration)
+        part = Insight(
+            insight.grid, insight.curves[now:], insight.chances[now:], insight.experts[now:], insight.duration
+        )
         chunks = [*scene.chunks(states[before:], before), *layout.signals(states[now:], now)]
         chunks += [layout.actions(actions[now:], now), *foresight.chunks(part, actions[now:], now)]
+        if now == 0:
+            chunks += foresight.looks(insight.grid)
         if now % EVERY == 0:
             chunks += foresight.ridge(insight, actions[:, 0], self._last)
         self._stream.send_chunks(chunks)

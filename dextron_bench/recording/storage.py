@@ -18,7 +18,7 @@ from rerun_bindings import (
     send_blueprint,
 )
 
-from dextron_bench import provenance
+from dextron_bench.storage import atomic
 
 APPLICATION = "dextron-bench"  # To the viewer, recordings in which success is foretold.
 PLAIN, PAIRS = f"{APPLICATION}-plain", f"{APPLICATION}-pairs"  # Others, since it has one layout an application.
@@ -38,7 +38,7 @@ def save(
     """Writes chunks to `file`, whole or not at all; returns the file's SHA-256. Raises UnwritableRecording."""
     try:
         content = _encoded(chunks, identity, blueprint, application)
-        provenance.write_whole(file, lambda part: part.write_bytes(content))
+        atomic.write_atomically(file, lambda part: part.write_bytes(content))
     except (OSError, RuntimeError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise UnwritableRecording(file, why) from error

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench import methods, provenance, publication, records, rollout, run, splits, weights
+from dextron_bench import methods, publication, records, rollout, run, splits, weights
 from dextron_bench.learning import Heir, Learner
 from dextron_bench.page.showreel import FOLDER
+from dextron_bench.storage import atomic
 from dextron_bench.submission import bundle, replaying, tables
 from dextron_bench.world import sources
 from dextron_bench.world.archive import MissingData
@@ -41,7 +42,7 @@ class Row:
 
 
 def rows(board: Path, wanted: Sequence[str] = (), reaches: Sequence[str] = ()) -> list[Row]:
-    """The rows of a board, those of the wanted methods and sources; raises NothingToVerify, DamagedRun."""
+    """The rows of a board, those of the wanted methods and sources; raises NothingToVerify, DamagedFile."""
     files = sorted((board / publication.RESULTS).glob(f"*/*/seed*/{records.RESULT}"))
     found = [Row(file.parent, records.read_result(file)) for file in files]
     kept = [row for row in found if not wanted or row.result["method"] in wanted]
@@ -79,7 +80,7 @@ def stamp(row: Row, finding: Finding) -> bool:
     if finding.problems or finding.actions.keys() != row.result["splits"].keys():
         return False
     told = {name: split | {"actions": finding.actions[name]} for name, split in row.result["splits"].items()}
-    provenance.write_json(row.folder / records.RESULT, {**row.result, "splits": told, "tier": "re-run"})
+    atomic.write_json(row.folder / records.RESULT, {**row.result, "splits": told, "tier": "re-run"})
     return True
 
 
@@ -90,7 +91,7 @@ def _replayed(row: Row, threads: int, report: Report) -> Finding:
     if problems := list(tables.faults(table, wanted)):
         return Finding("", problems)
     found = replaying.again(sources.open_source(reaches), wanted, table, threads, report)
-    manifest = records.read_json(row.folder.parent / bundle.MANIFEST)
+    manifest = atomic.read_json(row.folder.parent / bundle.MANIFEST)
     told = [row.result.get(name) for name in ("method", "reaches", "declared")]
     if told != [manifest.get(name) for name in ("name", "reaches", "declared")]:
         return Finding("", ["its name, reaches or declarations are not those that its manifest has"])

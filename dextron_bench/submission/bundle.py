@@ -17,7 +17,7 @@ from typing import Any
 import jsonschema
 from jsonschema.exceptions import best_match
 
-from dextron_bench import provenance
+from dextron_bench.storage import atomic, hashing
 
 FORMAT = 1
 MANIFEST = "bundle.json"
@@ -45,7 +45,7 @@ def pack(folder: Path, told: Mapping[str, Any], agent: Mapping[str, Path], file:
     parts = {name: file for file in found if MEMBER.fullmatch(name := str(file.relative_to(folder)))}
     check_agent(agent)
     parts |= {f"agent/{name}": found for name, found in agent.items()}
-    hashes = {name: sha256(found) for name, found in parts.items()}
+    hashes = {name: hashing.sha256(found) for name, found in parts.items()}
     manifest = {"format": FORMAT, **told, "files": hashes}
     check(manifest, "bundle", file)
 
@@ -58,7 +58,7 @@ def pack(folder: Path, told: Mapping[str, Any], agent: Mapping[str, Path], file:
                     while block := content.read(CHUNK):
                         to.write(block)
 
-    provenance.write_whole(file, write)
+    atomic.write_atomically(file, write)
     return manifest
 
 
@@ -101,12 +101,6 @@ def check_agent(files: Mapping[str, Path]) -> None:
         _check_name(file, f"agent/{name}")
         if file.stat().st_size > LARGEST:
             raise BadBundle(f"{file} is larger than the {LARGEST / 2**20:.0f} MiB that a bundle takes")
-
-
-def sha256(file: Path) -> str:
-    """The SHA-256 of a file's content, hexadecimal."""
-    with file.open("rb") as content:
-        return hashlib.file_digest(content, "sha256").hexdigest()
 
 
 @cache

@@ -9,12 +9,13 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench import recording, records, splits
+from dextron_bench.evaluation.episodes import Episode, trace
 from dextron_bench.isolation.agent import Limits
-from dextron_bench.rollout import AgentError, Episode
+from dextron_bench.rollout import AgentError
+from dextron_bench.storage import atomic
 from dextron_bench.submission import bundle, contest, replaying, tables
 from dextron_bench.submission.differences import differences, same_platform
 from dextron_bench.submission.verdict import Verdict
-from dextron_bench.traces import trace
 from dextron_bench.world import sources
 
 Report = Callable[[str, int, int], None]  # Told (what, episodes done, all).
@@ -43,7 +44,7 @@ class Seed:
         """Checks rows, replays, result and recordings."""
         try:
             table, result = self._read()
-        except (bundle.BadBundle, records.DamagedRun) as error:
+        except (bundle.BadBundle, atomic.DamagedFile) as error:
             self._object(str(error))
             return
         if faults := list(tables.faults(table, self._wanted)):
@@ -57,7 +58,7 @@ class Seed:
         self._judge(found, result)
 
     def _read(self) -> tuple[pd.DataFrame, dict[str, Any]]:
-        """The table of episodes and the result; raises BadBundle, DamagedRun."""
+        """The table of episodes and the result; raises BadBundle, DamagedFile."""
         for name in (records.EPISODES, records.RESULT, records.PROVENANCE):
             if not (self._folder / name).exists():
                 raise bundle.BadBundle(f"lacks {name}")
@@ -96,7 +97,7 @@ class Seed:
         verdict.exact += found.exact
         whose = {"method": self._manifest["name"], "reaches": self._manifest["reaches"], "seed": self._seed}
         told = result["provenance"]
-        if told != records.read_json(self._folder / records.PROVENANCE):
+        if told != atomic.read_json(self._folder / records.PROVENANCE):
             self._object("its result has another provenance than its run")
         if found.exact == found.episodes:
             self._object(*differences(result, whose | {"splits": computed, "provenance": told}))

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dextron_bench import rollout, splits
+from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.isolation.agent import Isolated, Launch, Limits
-from dextron_bench.rollout import AgentDown, AgentError, Episode
+from dextron_bench.rollout import AgentDown, AgentError
 from dextron_bench.world import model, sources
 
 EPISODES = 8

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench import methods, provenance, records, run, splits
+from dextron_bench import methods, records, run, splits
 from dextron_bench.isolation.agent import Isolated, Launch, Limits, launch
 from dextron_bench.rollout import rollout
+from dextron_bench.storage import hashing
 from dextron_bench.submission import bundle
 from dextron_bench.submission.declaration import Declaration
 from dextron_bench.world import model, sources
@@ -132,7 +133,8 @@ def compete(
 ) -> Path:
     """Plays all that an entry needs and the folder of runs lacks; returns the folder of its seeds.
 
-    Raises AgentError where the agent cannot be started, RunMismatch where the folder is another entry's, MissingData.
+    Raises AgentError where the agent cannot be started, FolderMismatch where the folder is another entry's,
+    MissingData.
     """
     folder, source = entry.folder(runs), sources.open_source(entry.reaches)
     bundle.check({"format": bundle.FORMAT, **entry.told(), "files": {}}, "bundle", folder)
@@ -166,7 +168,7 @@ def shuffled(
 
 def order(split: splits.Split, seed: int) -> np.ndarray:
     """The rows of a split in the order in which a submission with that seed plays them."""
-    mixed = provenance.digest(split.digest.encode(), str(seed).encode())
+    mixed = hashing.digest(split.digest.encode(), str(seed).encode())
     return np.random.default_rng(int(mixed, 16)).permutation(len(split.cases))
 
 
@@ -184,7 +186,7 @@ def finish(entry: Entry, folder: Path, file: Path) -> dict[str, Any]:
 
 def _config(entry: Entry, seed: int) -> dict[str, Any]:
     told = entry.told()
-    hashes = {name: bundle.sha256(file) for name, file in entry.files().items()}
+    hashes = {name: hashing.sha256(file) for name, file in entry.files().items()}
     return {name: told[name] for name in ("agent", "reaches", "physics")} | {
         "method": entry.name, "seed": seed, "files": hashes
     }  # fmt: skip

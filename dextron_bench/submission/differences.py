@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench import provenance
+from dextron_bench.storage import provenance
 
 
 def same_platform(told: dict[str, Any]) -> bool:
     """Whether a provenance is of a machine like this one, on which episodes must be equal bit for bit."""
-    here = provenance.collect()
+    here = provenance.collect(physics="")
     try:
         versions = told["versions"]["mujoco"] == here["versions"]["mujoco"]
         return versions and told["machine"]["cpu"] == here["machine"]["cpu"] and _kind(told) == _kind(here)

@@ -6,7 +6,8 @@ import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from dextron_bench import methods, provenance, publication, records
+from dextron_bench import methods, publication, records
+from dextron_bench.storage import atomic
 from dextron_bench.submission import bundle
 from dextron_bench.submission.contest import BadSubmission
 from dextron_bench.submission.verdict import Verdict
@@ -50,7 +51,7 @@ def _put(verdict: Verdict, board: Path) -> None:
         own = part / f"seed{seed}"
         own.mkdir(parents=True)
         records.store(own, verdict.tables[seed])
-        provenance.write_json(own / records.RESULT, {**result, "tier": verdict.tier})
-    provenance.write_json(part / bundle.MANIFEST, manifest)
+        atomic.write_json(own / records.RESULT, {**result, "tier": verdict.tier})
+    atomic.write_json(part / bundle.MANIFEST, manifest)
     shutil.rmtree(place, ignore_errors=True)
     part.replace(place)

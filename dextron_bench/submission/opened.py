@@ -6,6 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from dextron_bench import records, splits
+from dextron_bench.storage import hashing
 from dextron_bench.submission import bundle, contest, tables
 
 FOLDER = Path(contest.FOLDER, ".bundles")  # In the folder of runs; no submission can be called so.
@@ -19,7 +20,7 @@ def opened(file: Path, runs: Path) -> Path:
     """
     if not file.is_file():
         raise bundle.BadBundle(f"there is no file {file}")
-    place = runs / FOLDER / bundle.sha256(file)[:16]
+    place = runs / FOLDER / hashing.sha256(file)[:16]
     if place.is_dir():
         return place
     place.parent.mkdir(parents=True, exist_ok=True)

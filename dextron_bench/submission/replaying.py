@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench import records, splits
+from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.replay import replay
-from dextron_bench.rollout import Episode
 from dextron_bench.world.setting import Source
 
 TOLERANCE = 1e-3  # How far a number of the last state may be off on another platform.

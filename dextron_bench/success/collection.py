@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from dextron_bench import blocks, experts, tensors
-from dextron_bench.experts import Expert, ExpertAgent
-from dextron_bench.rollout import Agent, Case, rollout
+from dextron_bench import blocks, experts
+from dextron_bench.experts import Case, Expert, ExpertAgent
+from dextron_bench.rollout import Agent, rollout
+from dextron_bench.storage import tensors
 from dextron_bench.success import dataset
 from dextron_bench.world import task
 from dextron_bench.world.setting import Setting, Source
@@ -96,7 +97,7 @@ def collect(
 ) -> dict[str, Tally]:
     """Plays blocks until there are so many rows; returns what there is of each kind.
 
-    `agents` are the policies by name. Raises BadCollection, SearchMismatch where the folder holds another data set,
+    `agents` are the policies by name. Raises BadCollection, FolderMismatch where the folder holds another data set,
     BadDataset where a block is damaged, and what `rollout` does.
     """
     if rows < 1:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from dextron_bench import experts
-from dextron_bench.experts import Expert, ExpertAgent
-from dextron_bench.rollout import Agent, Case, Episode, rollout
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts import Case, Expert, ExpertAgent
+from dextron_bench.rollout import Agent, rollout
 from dextron_bench.success import judgement
 from dextron_bench.success.judgement import Judgement
 from dextron_bench.success.network import SuccessModel

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dextron_bench.diagnosis import Diagnosis, diagnose
-from dextron_bench.experts import ExpertAgent
-from dextron_bench.rollout import Agent, Case, Episode, rollout
-from dextron_bench.success.insight import Insight, look
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.experts import Case, ExpertAgent
+from dextron_bench.rollout import Agent, rollout
+from dextron_bench.success.insight import look
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.world import model as world
 from dextron_bench.world.setting import Source

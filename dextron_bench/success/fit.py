@@ -11,8 +11,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from dextron_bench import blocks, tensors
-from dextron_bench.records import RunMismatch
+from dextron_bench import blocks
+from dextron_bench.storage import tensors
+from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.success.dataset import Dataset
 from dextron_bench.success.network import CLIP, SIZES, SuccessModel
 
@@ -55,7 +56,7 @@ def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note:
     It is that of the epoch with the lowest loss on the episodes held out, since later ones learn theirs by heart and
     grow too sure. The folder then holds it, with its learning curve: losses and accuracies on both halves after each
     epoch. The same call ends with the same bytes, however often it was stopped, and if it had fewer epochs before.
-    Raises RunMismatch, EmptyDataset, BadDataset, BadTensors.
+    Raises FolderMismatch, EmptyDataset, BadDataset, BadTensors.
     """
     lesson = _Lesson(folder, settings)
     file = folder / STATE
@@ -162,12 +163,14 @@ class _Lesson:
         return found
 
     def resume(self, file: Path) -> None:
-        """Takes the place of the training that wrote a file; raises RunMismatch, BadTensors."""
+        """Takes the place of the training that wrote a file; raises FolderMismatch, BadTensors."""
         about, arrays = tensors.read_about(file), tensors.read(file)
         wanted = {"fit": asdict(self._settings), "rows": len(self._data)}
         shorter = {**about.get("fit", {}), "epochs": self._settings.epochs}  # That of fewer epochs goes on.
         if {"fit": shorter, "rows": about.get("rows")} != wanted or about["epoch"] > self._settings.epochs:
-            raise RunMismatch(f"{self._folder} holds another training; remove {file.name} there, or take its settings")
+            raise FolderMismatch(
+                f"{self._folder} holds another training; remove {file.name} there, or take its settings"
+            )
         self.epoch, self.curve = about["epoch"], about["curve"]
         if lacking := [name for name in self.arrays() if f"best.{name}" not in arrays]:
             raise tensors.BadTensors(file, f"it is no training under way: it lacks 'best.{lacking[0]}'; remove it")

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench import tensors
 from dextron_bench.exact import Perceptron, rounded
+from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 
 HIDDEN = 256
@@ -87,7 +87,7 @@ def told(reaches: str) -> dict[str, Any]:
 def digest(reaches: str) -> str:
     """The SHA-256 of the file of the model that ships, hexadecimal; raises MissingModel."""
     with as_file(_place(reaches)) as file:
-        return tensors.sha256(file)
+        return hashing.sha256(file)
 
 
 def _place(reaches: str) -> Traversable:

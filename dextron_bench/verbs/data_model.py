@@ -40,7 +40,7 @@ class Fit:
     def __call__(self) -> int:
         from importlib.resources import files
 
-        from dextron_bench import provenance
+        from dextron_bench.storage import atomic
         from dextron_bench.world import archive, synthetic_fit
 
         if self.seed < 0:
@@ -53,7 +53,7 @@ class Fit:
             synthetic_fit.save(model, made)
             content = made.read_bytes()
         into = self.into.expanduser()
-        provenance.write_whole(into, lambda part: part.write_bytes(content))
+        atomic.write_atomically(into, lambda part: part.write_bytes(content))
         print(f"{into}: {len(content):,} bytes, {compared(content, shipped)}")
         return 0
 

@@ -15,7 +15,7 @@ from dextron_bench.verbs.success import folder_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dextron_bench.rollout import Case
+    from dextron_bench.experts import Case
     from dextron_bench.success.network import SuccessModel
 
 
@@ -135,7 +135,7 @@ def _first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
 
 def chosen(file: Path | None, runs: Path, reaches: str) -> SuccessModel:
     """The model of a file; else the one trained in a folder of runs; else the one that ships."""
-    from dextron_bench import tensors
+    from dextron_bench.storage import tensors
     from dextron_bench.success import fit, network
 
     own = folder_of(runs, reaches, 0) / fit.MODEL

@@ -38,11 +38,12 @@ class Data:
     """Print the summary as JSON."""
 
     def __call__(self) -> int:
-        from dextron_bench import splits, tensors, weights
+        from dextron_bench import splits, weights
+        from dextron_bench.storage import hashing
         from dextron_bench.success import collection
         from dextron_bench.world.sources import open_source
 
-        agents = {tensors.sha256(file): weights.own(file) for file in self.policies}
+        agents = {hashing.sha256(file): weights.own(file) for file in self.policies}
         wanted = collection.Collection(self.reaches, self.seed, tuple(agents))
         source, train = open_source(self.reaches), splits.load(self.reaches, "train").cases
         folder = folder_of(self.runs, self.reaches, self.seed)
@@ -80,7 +81,7 @@ class Train:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench import tensors
+        from dextron_bench.storage import tensors
         from dextron_bench.success import fit
 
         folder = folder_of(self.runs, self.reaches, self.data)

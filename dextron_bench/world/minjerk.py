@@ -17,10 +17,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from dextron_bench.world.model import CONTROL_STEP
-from dextron_bench.world.reach import DECIMALS, Path, ReachError
+from dextron_bench.world.reach import CONTROL_STEP, DECIMALS, Path, ReachError
 from dextron_bench.world.setting import Setting, Stratum, UnknownReach
-from dextron_bench.world.task import STEP_LIMIT
 
 REACHES = 1000  # Reaches that are listed and sampled; further numbers are known by name.
 NAME = re.compile(r"minjerk-\d{6}")
@@ -31,8 +29,8 @@ VIA = np.array([-0.045, -0.10, 0.10])  # [m] where the carrier stops beside the 
 VIA_SPREAD = 0.02  # [m] the via point's height is drawn this far up or down.
 LIFT = np.array([0.0, 0.0, 0.2])  # [m]
 ORIENTATION = np.array([1.0, 0.0, 1.0, 0.0]) / np.sqrt(2.0)
-REACH_STEPS = STEP_LIMIT // 2  # Control steps of the reach.
-LIFT_STEPS = STEP_LIMIT // 3
+REACH_STEPS = 250  # Control steps of the reach: half the limit of an episode.
+LIFT_STEPS = 166  # Control steps of the lift: a third of that limit.
 SLACK = 0.01  # Share of a leg's time that is always left to go, so that the law stays finite.
 BANDS = 4  # Rings and angles of a start region.
 

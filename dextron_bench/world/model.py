@@ -9,7 +9,8 @@ from importlib.resources import files
 import mujoco
 import numpy as np
 
-CONTROL_STEP = 0.02  # [s]
+from dextron_bench.world.reach import CONTROL_STEP as CONTROL_STEP
+
 DIGITS = ("thumb", "index", "middle", "ring", "little")
 STATE = 48  # qpos (25), then qvel (23).
 THUMB_OPPOSED = 1.05  # [rad] where the thumb's base is held.

@@ -14,7 +14,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from dextron_bench.world import rotation
 
-STEP = 0.02  # [s] control step, and so the sampling interval of a path.
+CONTROL_STEP = 0.02  # [s] the interval between two actions, and between two poses of a path.
 TIME_SCALE = 2.5  # New duration = TIME_SCALE x old + TIME_SHIFT + TIME_SPREAD x noise (table I).
 TIME_SHIFT = 0.5  # [s]
 TIME_SPREAD = 0.8  # [s]
@@ -128,7 +128,7 @@ def path(reach: Reach, offset_x: float, offset_y: float, duration_noise: float) 
             f"less than the recorded {reach.duration:.2f} s; use a larger one"
         )
     scale = duration / reach.duration
-    steps = np.arange(int(np.floor(duration / STEP + 1e-9)) + 1) * STEP
+    steps = np.arange(int(np.floor(duration / CONTROL_STEP + 1e-9)) + 1) * CONTROL_STEP
     positions, quaternions = reach.curve(np.minimum(steps / scale, reach.duration))
     arrived = reach.reached * scale
     settled = (steps >= arrived) & (steps < arrived + SETTLE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from dextron_bench.world.reach import STEP
+from dextron_bench.world.reach import CONTROL_STEP
 from dextron_bench.world.setting import ReachSource, Setting, Source
 
 MEASURES = ("duration", "length", "speed")
@@ -36,7 +36,7 @@ def _motion(source: Source, name: str) -> tuple[float, float]:
         reach = source.reach(name)
         return reach.duration, path_length(reach.positions)
     positions = source.path(Setting(name, 0.0, 0.0, 0.0)).positions
-    return (len(positions) - 1) * STEP, path_length(positions)
+    return (len(positions) - 1) * CONTROL_STEP, path_length(positions)
 
 
 def path_length(positions: np.ndarray) -> float:

@@ -12,7 +12,8 @@ from mujoco.batch import Batch
 from pytest_benchmark.fixture import BenchmarkFixture
 from workload import Prepared, cases, reaches
 
-from dextron_bench import rollout
+from dextron_bench import experts, rollout
+from dextron_bench.evaluation import episodes
 from dextron_bench.experts import ExpertAgent
 from dextron_bench.world import model
 from dextron_bench.world.engine import Engine, Step
@@ -56,7 +57,7 @@ class Listening(Engine):
         return step
 
 
-def taped(played: list[rollout.Case], source: Prepared) -> Tape:
+def taped(played: list[experts.Case], source: Prepared) -> Tape:
     """What a rollout of experts gives to its batch."""
 
     class ThisTape(Listening):
@@ -70,7 +71,7 @@ def taped(played: list[rollout.Case], source: Prepared) -> Tape:
     return ThisTape.tape
 
 
-def play(played: list[rollout.Case], source: Prepared, threads: int) -> list[tuple[int, rollout.Episode]]:
+def play(played: list[experts.Case], source: Prepared, threads: int) -> list[tuple[int, episodes.Episode]]:
     """Experts through the one evaluation loop."""
     return list(rollout.rollout(ExpertAgent(), source, played, slots=SLOTS, threads=threads))
 

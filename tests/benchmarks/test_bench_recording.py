@@ -13,6 +13,7 @@ from rerun.chunk import RrdReader
 from workload import Prepared, cases
 
 from dextron_bench import recording, records, rollout
+from dextron_bench.evaluation import episodes
 from dextron_bench.experts import ExpertAgent
 from dextron_bench.splits import Split
 from dextron_bench.success import insight
@@ -34,7 +35,7 @@ class Stage:
     def __init__(self, folder: Path) -> None:
         self.folder, self.cases, self.model = folder, cases(scaled(EPISODES)), model()
         self.source = Prepared(self.cases)
-        self.episodes: dict[int, rollout.Episode] = {}
+        self.episodes: dict[int, episodes.Episode] = {}
 
     def play(self) -> None:
         """Rolls them out, on all cores."""

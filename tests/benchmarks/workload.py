@@ -8,8 +8,7 @@ from functools import cache
 import numpy as np
 
 from dextron_bench import montecarlo
-from dextron_bench.experts import Expert
-from dextron_bench.rollout import Case
+from dextron_bench.experts import Case, Expert
 from dextron_bench.world import setting
 from dextron_bench.world.archive import MissingData
 from dextron_bench.world.reach import Path

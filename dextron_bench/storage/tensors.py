@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 from safetensors.numpy import load, save
 
-from dextron_bench import provenance
+from dextron_bench.storage import atomic
 
 ABOUT = "about"  # The one key of a file's metadata, as the order of several would be left to chance.
 KINDS = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
@@ -31,7 +30,7 @@ def write(file: Path, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]
         {name: np.asarray(array, order="C") for name, array in arrays.items()},
         {ABOUT: json.dumps(about, sort_keys=True)},
     )
-    provenance.write_whole(file, lambda part: part.write_bytes(content))
+    atomic.write_atomically(file, lambda part: part.write_bytes(content))
 
 
 def read(file: Path) -> dict[str, np.ndarray]:
@@ -65,11 +64,6 @@ def read_about(file: Path) -> dict[str, Any]:
         return found if isinstance(found, dict) else {}
     except (ValueError, AttributeError, TypeError, RecursionError) as error:
         raise BadTensors(file, "its header cannot be read") from error
-
-
-def sha256(file: Path) -> str:
-    """The SHA-256 of a file, hexadecimal."""
-    return hashlib.sha256(_content(file)).hexdigest()
 
 
 def _mapped(file: Path, start: int, entry: Mapping[str, Any]) -> np.ndarray:

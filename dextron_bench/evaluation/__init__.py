@@ -1,0 +1,1 @@
+"""Playing episodes: agents on settings, replays of actions, and why episodes fail."""

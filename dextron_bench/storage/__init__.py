@@ -1,0 +1,1 @@
+"""Files that are whole or absent, their hashes, and the code and versions that made them."""
