@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import torch
-from dextron_bench.learning import Arrays, Track, Trainer
+from dextron_bench.methods.learners import Arrays, Track, Trainer
 from torch import Tensor
 
 from baselines import demonstrations, policy, snapshot

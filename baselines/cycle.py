@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import torch
-from dextron_bench.experts import Case
-from dextron_bench.learning import Arrays, Track
+from dextron_bench.experts.policies import Case
+from dextron_bench.methods.learners import Arrays, Track
 from dextron_bench.world.engine import Engine
 from torch import Tensor
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 import numpy as np
+from dextron_bench.reaches.sources import SOURCES
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.success import network
 from dextron_bench.success.network import GRID, SuccessModel
 from dextron_bench.world import task
-from dextron_bench.world.sources import SOURCES
 
 FILE = ".safetensors"  # What names a file, not a source of reaches.
 OPENS = -1.0  # What a hand does that is still far away, or has done nothing yet.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from dextron_bench.exact import Perceptron, rounded
+from dextron_bench.methods.exact import Perceptron, rounded
 from torch import Tensor
 from torch.nn.functional import softplus
 

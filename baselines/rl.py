@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from dextron_bench.learning import Track, Trainer
+from dextron_bench.methods.learners import Track, Trainer
 
 from baselines.cycle import Cycle
 from baselines.policy import MeanAgent

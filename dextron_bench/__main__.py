@@ -2,6 +2,6 @@
 
 import sys
 
-from dextron_bench.cli import main
+from dextron_bench.cli.main import main
 
 sys.exit(main())

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench.experts.policies import Expert, ExpertAgent
 from dextron_bench.world import suite
 
 

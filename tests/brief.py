@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 
+from dextron_bench.reaches.minjerk import ORIENTATION
+from dextron_bench.reaches.reach import Reach
+from dextron_bench.reaches.setting import ReachSource, Setting
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.minjerk import ORIENTATION
-from dextron_bench.world.reach import Reach
-from dextron_bench.world.setting import ReachSource, Setting
 
 GRASP = (-0.015, 0.005)  # [m] an offset from which the closing fingers get hold of the bottle.
 BRUSH = (0.02, 0.06)  # [m] one from which the hand knocks it over.

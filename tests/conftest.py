@@ -15,9 +15,9 @@ import browsing
 import forging
 import pytest
 
-from dextron_bench import cli
-from dextron_bench.world.setting import Source
-from dextron_bench.world.sources import open_source
+from dextron_bench.cli import main as cli
+from dextron_bench.reaches.setting import Source
+from dextron_bench.reaches.sources import open_source
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes would otherwise take every core.
 

@@ -14,11 +14,12 @@ import pandas as pd
 import pytest
 import tiny
 
-from dextron_bench import records
-from dextron_bench.isolation.agent import Limits
+from dextron_bench.leaderboard.submission import bundle, verification
+from dextron_bench.leaderboard.submission import playing as contest
+from dextron_bench.leaderboard.submission.verdict import Verdict
+from dextron_bench.methods.isolation.isolated_agent import Limits
+from dextron_bench.runs import run_files as records
 from dextron_bench.storage import hashing
-from dextron_bench.submission import bundle, contest, verification
-from dextron_bench.submission.verdict import Verdict
 
 AGENT = """
 import numpy as np

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dextron_bench import pictures
-from dextron_bench.world import appearance, dressing, model
-from dextron_bench.world.shells import Section, loft
+from dextron_bench.recording import stills as pictures
+from dextron_bench.world import model
+from dextron_bench.world.rendering import renderer as appearance
+from dextron_bench.world.rendering import visuals as dressing
+from dextron_bench.world.rendering.meshes import Section, loft
 
 SIZES = ["nq", "nv", "nu", "nbody", "njnt", "neq", "nmocap", "qpos0"]
 BODIES = ["body_mass", "body_inertia", "body_ipos", "body_iquat", "body_pos", "body_quat"]

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from conftest import NAMES, Published
 
-from dextron_bench.world import archive, sources
-from dextron_bench.world.reach import Reach
-from dextron_bench.world.release import Manifest
+from dextron_bench.reaches import sources
+from dextron_bench.reaches.reach import Reach
+from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded.release import Manifest
 
 
 @pytest.fixture(autouse=True)

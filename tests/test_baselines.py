@@ -13,8 +13,8 @@ from baselines.exp import Exp
 from baselines.floors import Nothing, Random
 from baselines.omega import OmegaAgent
 from baselines.reflex import BadDistance, Reflex
-from dextron_bench.experts import Expert
-from dextron_bench.rollout import Agent, Privileged
+from dextron_bench.evaluation.rollout import Agent, Privileged
+from dextron_bench.experts.policies import Expert
 from dextron_bench.world import model, task
 
 KINDS: dict[str, Callable[[], Agent]] = {  # The agents of methods that need no training.

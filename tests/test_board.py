@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench import cli, recording
-from dextron_bench.submission import contest, merging
+from dextron_bench import recording
+from dextron_bench.cli import main as cli
+from dextron_bench.leaderboard import add as merging
+from dextron_bench.leaderboard.submission import playing as contest
 
 
 def test_the_command_line_submits_verifies_adds_and_verifies_the_board(

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 import tiny
 
-from dextron_bench.submission import bundle, contest
+from dextron_bench.leaderboard.submission import bundle
+from dextron_bench.leaderboard.submission import playing as contest
 
 
 class Unsafe:

@@ -15,8 +15,8 @@ import pandas as pd
 import pytest
 import tiny
 
-from dextron_bench import cli
-from dextron_bench.records import read_result
+from dextron_bench.cli import main as cli
+from dextron_bench.runs.run_files import read_result
 from dextron_bench.storage import atomic
 
 AGENT = """
@@ -208,7 +208,7 @@ def test_a_leaderboard_without_results_says_how_to_make_some(here: Path, capsys:
 
 
 def test_a_search_prints_json(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    from dextron_bench import montecarlo
+    from dextron_bench.experts import montecarlo
 
     draws = pd.DataFrame([("a", 0.0, 0.0, 0.0, 1.0, 0.5, 20.0, 90)], columns=[*tiny.COLUMNS[1:7], "score", "length"])
     monkeypatch.setattr(montecarlo, "run", lambda *_, **__: draws)
@@ -242,19 +242,19 @@ def test_interrupted_a_run_is_code_130_and_goes_on_later(here: Path, capsys: pyt
 
 
 def test_help_and_the_package_itself_import_nothing_heavy():
-    script = "import sys\ntry:\n from dextron_bench.cli import main; main(['--help'])\nexcept SystemExit: pass\n"
+    script = "import sys\ntry:\n from dextron_bench.cli.main import main; main(['--help'])\nexcept SystemExit: pass\n"
     done = subprocess.run(
         [sys.executable, "-c", f"{script}print('LOADED', *sys.modules)"], capture_output=True, text=True, check=True
     )
     help_text, _, loaded = done.stdout.partition("LOADED")
     assert "Exit codes" in help_text
-    assert {"dextron_bench.verbs.run"} <= set(loaded.split())
+    assert {"dextron_bench.cli.run"} <= set(loaded.split())
     assert not HEAVY & set(loaded.split())
 
 
 def test_products_of_numpy_take_one_thread_unless_it_is_said_otherwise():
     script = (
-        "from dextron_bench.cli import main; main(['--version']); import numpy, threadpoolctl; "
+        "from dextron_bench.cli.main import main; main(['--version']); import numpy, threadpoolctl; "
         "print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
     )
     inherited = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dextron_bench import cli, splits, strata
+from dextron_bench.cli import main as cli
+from dextron_bench.splits import loading as splits
+from dextron_bench.splits import strata
 
 SPLIT = splits.load("real", "test")
 ROWS = len(SPLIT.cases)

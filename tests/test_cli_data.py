@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 from conftest import Published
 
-from dextron_bench import cli
-from dextron_bench.world import archive, release
+from dextron_bench.cli import main as cli
+from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded import release
 
 FILE, NOTES = "extracts/01_fl_06.json", "extracts/meta/01_fl_06_meta.json"
 INJECT = """
@@ -21,7 +22,7 @@ import sys
 from pathlib import Path
 from dextron_bench.world import release
 release.SHIPPED = Path(sys.argv.pop(1))
-from dextron_bench.cli import main
+from dextron_bench.cli.main import main
 sys.exit(main())
 """  # The command line, checking against another manifest than the shipped one.
 
@@ -184,8 +185,8 @@ def test_every_end_has_its_code(
 
 
 def test_picture_of_a_source(published: Published, tmp_path: Path):
-    from dextron_bench.figures import UnknownFormat, reach_paths
-    from dextron_bench.world.setting import ReachSource
+    from dextron_bench.reaches.setting import ReachSource
+    from dextron_bench.scores.figures import UnknownFormat, reach_paths
 
     reaches = release.read(published.zip(), release.Manifest.load(published.manifest))
     reach_paths(ReachSource("real", reaches), tmp_path / "reaches.png")

@@ -12,7 +12,7 @@ import tiny
 from PIL import Image
 from rerun.chunk import RrdReader
 
-from dextron_bench import cli
+from dextron_bench.cli import main as cli
 
 FOLDER = "runs/exp/synthetic/seed0/recordings"
 

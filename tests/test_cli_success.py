@@ -11,9 +11,10 @@ import pytest
 import tiny
 import toy_world
 
-from dextron_bench import cli
+from dextron_bench.cli import main as cli
 from dextron_bench.storage import tensors
-from dextron_bench.success import collection, fit
+from dextron_bench.success import generation as collection
+from dextron_bench.success import training as fit
 
 
 @pytest.fixture

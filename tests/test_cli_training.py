@@ -19,9 +19,9 @@ import toy_world
 from safetensors.numpy import save_file
 from toy_world import HEIR, HOMELY, TOY
 
-from dextron_bench import cli
+from dextron_bench.cli import main as cli
+from dextron_bench.cli.method_flags import in_a_line
 from dextron_bench.storage import hashing, tensors
-from dextron_bench.verbs.settings import in_a_line
 from dextron_bench.world import model
 
 SHAPE = model.STATE

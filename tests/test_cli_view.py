@@ -12,7 +12,8 @@ import pytest
 import rerun as rr
 import tiny
 
-from dextron_bench import cli, recording
+from dextron_bench import recording
+from dextron_bench.cli import main as cli
 from dextron_bench.success import network
 
 NOTHING = "runs/nothing/synthetic/seed0"
@@ -97,7 +98,7 @@ def test_what_is_damaged_is_named_and_the_rest_is_opened(
 def test_where_more_match_it_says_how_to_have_them(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
-    from dextron_bench import gallery
+    from dextron_bench.runs import selection as gallery
 
     monkeypatch.setattr(gallery, "LIMIT", 1)
     assert cli.main(["view", "--split", "test"]) == 0

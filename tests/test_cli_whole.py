@@ -17,7 +17,7 @@ import toy_world
 from toy_world import TOY
 
 from baselines import schedule
-from dextron_bench import cli
+from dextron_bench.cli import main as cli
 
 FAST = ["--split", "test", "--seed", "0", "1", "--quiet", "--record", "0"]
 

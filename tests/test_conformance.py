@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 import tiny
 
-from dextron_bench import cli
-from dextron_bench.isolation.agent import Limits, launch
-from dextron_bench.submission.conformance import MEND, NOTE, OK, Check, checks
+from dextron_bench.cli import main as cli
+from dextron_bench.leaderboard.submission.conformance import MEND, NOTE, OK, Check, checks
+from dextron_bench.methods.isolation.isolated_agent import Limits, launch
 
 AGENT = """
 import time

@@ -11,10 +11,13 @@ import pandas as pd
 import pytest
 from test_recording import PATH, episode
 
-from dextron_bench import conversion, film, recording
-from dextron_bench.conversion import UnknownEnding
-from dextron_bench.film import Look
-from dextron_bench.world import appearance, model
+from dextron_bench import recording
+from dextron_bench.recording import export as conversion
+from dextron_bench.recording import film
+from dextron_bench.recording.export import UnknownEnding
+from dextron_bench.recording.film import Look
+from dextron_bench.world import model
+from dextron_bench.world.rendering import renderer as appearance
 
 
 @pytest.fixture(scope="module")

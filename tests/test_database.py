@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 from brief import SOURCE
 
-from dextron_bench import database
-from dextron_bench.database import DamagedDatabase
-from dextron_bench.montecarlo import Search
+from dextron_bench.experts import database
+from dextron_bench.experts.database import DamagedDatabase
+from dextron_bench.experts.montecarlo import Search
 
 SEARCH = Search("brief", seed=7, experts=3, block=2)
 

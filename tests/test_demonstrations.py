@@ -7,9 +7,9 @@ from brief import SETTINGS, SOURCE
 
 from baselines import demonstrations
 from baselines.demonstrations import Demonstrations
-from dextron_bench.experts import Case, Expert, ExpertAgent
-from dextron_bench.learning import Track
-from dextron_bench.rollout import rollout
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.methods.learners import Track
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS[:3]]
 

@@ -8,15 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench import diagnosis
-from dextron_bench.diagnosis import closing, diagnose, expert_closing, touch
+from dextron_bench.evaluation import diagnosis
+from dextron_bench.evaluation.diagnosis import closing, diagnose, expert_closing, touch
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.experts import Case, Expert, ExpertAgent
-from dextron_bench.rollout import rollout
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.reaches.minjerk import MinjerkSource
+from dextron_bench.reaches.reach import PALM_CENTRE
+from dextron_bench.reaches.setting import Setting
 from dextron_bench.world import model, task
-from dextron_bench.world.minjerk import MinjerkSource
-from dextron_bench.world.reach import PALM_CENTRE
-from dextron_bench.world.setting import Setting
 
 SETTING = Setting("made-up", 0.0, 0.0, 0.0)
 CASE = Case(SETTING, Expert(1.2, 0.251), 0.1)  # Closes from 0.1 m on, in state 30 of APPROACH.

@@ -10,7 +10,8 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import pytest
 from conftest import Published
 
-from dextron_bench.world import archive, download, release
+from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded import download, release
 
 
 class Server(BaseHTTPRequestHandler):

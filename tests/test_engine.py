@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from brief import SETTINGS, SOURCE, Played, actions, played
 
+from dextron_bench.reaches.reach import PALM_AHEAD
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.reach import PALM_AHEAD
 
 
 def play(engine: Engine, queue: list[int], slots: np.ndarray) -> dict[int, Played]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench.page.entries import Entry, entries
+from dextron_bench.leaderboard.page.rows import Entry, entries
 
 ROW = pd.DataFrame([{"method": "mine", "reaches": "synthetic", "split": "test", "return": 5.0}])
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dextron_bench.exact import BLOCK, Perceptron, whole
+from dextron_bench.methods.exact import BLOCK, Perceptron, whole
 
 
 def layers(rng: np.random.Generator, *sizes: int) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dextron_bench import experts
+from dextron_bench.experts import policies as experts
 from dextron_bench.world import model
 
 

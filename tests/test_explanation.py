@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dextron_bench import figures
-from dextron_bench.diagnosis import Diagnosis
+from dextron_bench.evaluation.diagnosis import Diagnosis
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.predictions import Insight
-from dextron_bench.success.explanation import KINDS, Foresight, choose
+from dextron_bench.reaches.setting import Setting
+from dextron_bench.scores import figures
+from dextron_bench.success.exemplars import KINDS, Foresight, choose
 from dextron_bench.success.network import GRID
-from dextron_bench.world.setting import Setting
 
 
 def seen(player: str, cause: str, best: list[float], own: list[float]) -> Foresight:

@@ -15,13 +15,14 @@ import toy_world
 from brief import SETTINGS, SOURCE
 
 from baselines.floors import Nothing
-from dextron_bench import cli, export
-from dextron_bench.experts import Case, Expert, ExpertAgent
-from dextron_bench.rollout import rollout
-from dextron_bench.splits import Split
+from dextron_bench.cli import main as cli
+from dextron_bench.evaluation import minari_export as export
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.reaches.setting import Setting
+from dextron_bench.splits.loading import Split
 from dextron_bench.storage import hashing
 from dextron_bench.world.gym import GraspEnv
-from dextron_bench.world.setting import Setting
 
 minari = pytest.importorskip("minari", reason="Minari is not installed: pip install -e '.[minari]'")
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dextron_bench import film
-from dextron_bench.film import BadLook, Look, NoEncoder
-from dextron_bench.world import appearance, model
+from dextron_bench.recording import film
+from dextron_bench.recording.film import BadLook, Look, NoEncoder
+from dextron_bench.world import model
+from dextron_bench.world.rendering import renderer as appearance
 
 SMALL = Look(64, 48)
 

@@ -13,12 +13,13 @@ from rerun.chunk import RrdReader
 from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.predictions import Insight, expert_actions
-from dextron_bench.experts import Case, Expert, ExpertAgent
-from dextron_bench.recording import foresight, scene
-from dextron_bench.rollout import rollout
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.reaches.setting import Setting
+from dextron_bench.recording import scene
+from dextron_bench.recording import success_plots as foresight
 from dextron_bench.success.network import GRID
 from dextron_bench.world import model
-from dextron_bench.world.setting import Setting
 
 SETTING = Setting("05_fr_05", 0.01, -0.02, 1 / 3)
 CASE = Case(SETTINGS[0], Expert(1.2, 0.3), 0.1)

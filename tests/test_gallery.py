@@ -8,8 +8,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dextron_bench import gallery
-from dextron_bench.gallery import BadWish, NothingToView, Wish
+from dextron_bench.runs import selection as gallery
+from dextron_bench.runs.selection import BadWish, NothingToView, Wish
 
 COLUMNS = ["method", "reaches", "seed", "split", "row", "score", "length", "cause"]
 TABLE = pd.DataFrame(

@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import dextron_bench  # noqa: F401  # Registers the environments.
 from dextron_bench.world import task
-from dextron_bench.world.faces import ActionError
+from dextron_bench.world.environment import ActionError
 from dextron_bench.world.gym import GraspEnv, GraspVectorEnv
 
 ID = "dextron_bench/Grasp-v0"

@@ -19,12 +19,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny import ROWS
 
-from dextron_bench import splits
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.experts import Case
-from dextron_bench.isolation import policies, sandbox, wire
-from dextron_bench.isolation.agent import Isolated, Limits, launch
-from dextron_bench.rollout import AgentError, rollout
+from dextron_bench.evaluation.rollout import AgentError, rollout
+from dextron_bench.experts.policies import Case
+from dextron_bench.methods.isolation import policy_files as policies
+from dextron_bench.methods.isolation import protocol as wire
+from dextron_bench.methods.isolation import sandbox
+from dextron_bench.methods.isolation.isolated_agent import Isolated, Limits, launch
+from dextron_bench.splits import loading as splits
 
 CASES: list[Case] = splits.cases(ROWS[:3])
 AGENT = """
@@ -86,7 +88,9 @@ def test_installed_methods_and_what_agents_print(made: Callable[[str], str]):
 
 
 def test_a_learners_file_can_be_its_agents_too(made: Callable[[str], str]):
-    (episode,) = play(made("from dextron_bench.learning import Track; return np.zeros((len(states), 1))"), CASES[:1])
+    (episode,) = play(
+        made("from dextron_bench.methods.learners import Track; return np.zeros((len(states), 1))"), CASES[:1]
+    )
     assert episode.failure == ""
 
 

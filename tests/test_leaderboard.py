@@ -4,7 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench import leaderboard, splits, strata
+from dextron_bench.scores import standings as leaderboard
+from dextron_bench.splits import loading as splits
+from dextron_bench.splits import strata
 
 
 def result(

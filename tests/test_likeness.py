@@ -14,12 +14,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench import cli, likeness
-from dextron_bench.likeness_features import GROUPS, alone, features, measures, nearest, summaries
-from dextron_bench.verbs.data_model import compared, print_likeness
-from dextron_bench.world import archive
-from dextron_bench.world.reach import Reach
-from dextron_bench.world.synthetic import generate, load, shipped
+from dextron_bench.cli import main as cli
+from dextron_bench.cli.data_synthetic import compared, print_likeness
+from dextron_bench.reaches.reach import Reach
+from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.synthetic import two_sample as likeness
+from dextron_bench.reaches.synthetic.generator import generate, load, shipped
+from dextron_bench.reaches.synthetic.two_sample_features import GROUPS, alone, features, measures, nearest, summaries
 
 STUDY = """
 import sys
@@ -31,7 +32,7 @@ likeness.TREES, likeness.REPEATS, likeness.COUNT = 5, 20, 16
 made = [generate(number, shipped()) for number in (*range(16), *range(64, 80), *range(192, 208))]
 archive.load_reaches = lambda: [replace(r, name=f"{r.subject}_{k // 16}_{k % 16}") for k, r in enumerate(made)]
 likeness.fit = lambda reaches, seed: shipped()
-from dextron_bench.cli import main
+from dextron_bench.cli.main import main
 sys.exit(main())
 """  # The command line with made-up recordings, of three subjects, and small classifiers.
 

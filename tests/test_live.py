@@ -13,12 +13,13 @@ import pytest
 from brief import SETTINGS, SOURCE
 from rerun.chunk import RrdReader
 
-from dextron_bench import live, recording
+from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.predictions import Insight
-from dextron_bench.experts import Case, Expert, ExpertAgent
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.recording import viewer
-from dextron_bench.rollout import rollout
+from dextron_bench.success import live
 from dextron_bench.success.network import SIZES, SuccessModel
 
 CASE = Case(SETTINGS[0], Expert(1.4, 0.17), 0.1)

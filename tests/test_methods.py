@@ -11,9 +11,9 @@ import pytest
 
 from baselines.exp import Exp
 from baselines.floors import Nothing, Random
-from dextron_bench import methods
-from dextron_bench.methods import UnknownMethod
-from dextron_bench.rollout import AgentError
+from dextron_bench.evaluation.rollout import AgentError
+from dextron_bench.methods import registry as methods
+from dextron_bench.methods.registry import UnknownMethod
 
 AGENT = """
 from pathlib import Path
@@ -87,7 +87,7 @@ def test_an_unknown_name_lists_the_others():
         ("nosuch.module:Agent", "ModuleNotFoundError: No module named 'nosuch'"),
         ("baselines.exp:Nosuch", "'baselines.exp:Nosuch' is not a method"),
         ("baselines.exp:dataclass", "is not a method"),
-        ("dextron_bench.experts:ExpertAgent", "needs to be a class with `name` and `agent"),
+        ("dextron_bench.experts.policies:ExpertAgent", "needs to be a class with `name` and `agent"),
         ("nosuch.py:Agent", "there is no file nosuch.py"),
         (":Agent", "cannot be imported"),
     ],

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dextron_bench import experts
+from dextron_bench.experts import policies as experts
+from dextron_bench.reaches.minjerk import LIFT_STEPS, REACH_STEPS, Draw, MinjerkSource, band, carrier, leg
+from dextron_bench.reaches.reach import ReachError, palm_centre
+from dextron_bench.reaches.setting import Setting, UnknownReach
+from dextron_bench.reaches.sources import open_source
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.minjerk import LIFT_STEPS, REACH_STEPS, Draw, MinjerkSource, band, carrier, leg
-from dextron_bench.world.reach import ReachError, palm_centre
-from dextron_bench.world.setting import Setting, UnknownReach
-from dextron_bench.world.sources import open_source
 
 FIRST_OF_123 = [-0.106000607, -0.449409143, 0.1]  # [m] that a published name must always mean.
 

@@ -12,11 +12,13 @@ import pandas as pd
 import pytest
 from brief import SOURCE
 
-from dextron_bench import blocks, experts, montecarlo, rollout
-from dextron_bench.blocks import Tally
-from dextron_bench.montecarlo import Search, Share
+from dextron_bench.evaluation import rollout
+from dextron_bench.experts import blocks, montecarlo
+from dextron_bench.experts import policies as experts
+from dextron_bench.experts.blocks import Tally
+from dextron_bench.experts.montecarlo import Search, Share
+from dextron_bench.reaches import setting
 from dextron_bench.storage import folder_config
-from dextron_bench.world import setting
 from dextron_bench.world.engine import Engine
 
 SMALL = Search("brief", seed=3, experts=3, block=4)

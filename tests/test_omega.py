@@ -12,7 +12,8 @@ import pytest
 import tiny
 
 from baselines.omega import BadRule, NoModel, Omega, OmegaAgent, choose
-from dextron_bench import cli, methods
+from dextron_bench.cli import main as cli
+from dextron_bench.methods import registry as methods
 from dextron_bench.storage import hashing
 from dextron_bench.success.network import GRID, SuccessModel
 

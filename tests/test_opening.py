@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from dextron_bench import experts, opening, rollout
-from dextron_bench.experts import Expert, ExpertAgent
+from dextron_bench.evaluation import rollout
+from dextron_bench.experts import branching as opening
+from dextron_bench.experts import policies as experts
+from dextron_bench.experts.policies import Expert, ExpertAgent
+from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.minjerk import MinjerkSource
 
 SOURCE = MinjerkSource()
 CRITICALS = np.array([0.12, 0.95, 0.30, 0.12, 0.02])

@@ -9,8 +9,10 @@ import browsing
 import pandas as pd
 import pytest
 
-from dextron_bench import leaderboard, page, splits
-from dextron_bench.diagnosis import CAUSES
+from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.leaderboard import page
+from dextron_bench.scores import standings as leaderboard
+from dextron_bench.splits import loading as splits
 
 BOARD = Path(__file__).parents[1] / "leaderboard"
 PUBLISHED = (BOARD / page.FILE).as_uri()

@@ -10,7 +10,7 @@ from brief import SETTINGS, SOURCE
 from rerun.chunk import RrdReader
 
 from dextron_bench import recording
-from dextron_bench.replay import replay
+from dextron_bench.evaluation.replay import replay
 
 
 def recorded(file: Path, place: int, speed: float, method: str) -> Path:

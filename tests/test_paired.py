@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dextron_bench import paired
+from dextron_bench.scores import paired
 
 RETURNS = st.integers(0, 20).map(float)
 ROWS = 6

@@ -6,13 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench import cli, experts, partition, partition_minjerk, splits
-from dextron_bench.experts import ExpertAgent
-from dextron_bench.partition import Sizes, TooFewRows
-from dextron_bench.rollout import rollout
-from dextron_bench.world import setting
+from dextron_bench.cli import main as cli
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts import policies as experts
+from dextron_bench.experts.policies import ExpertAgent
+from dextron_bench.reaches import setting
+from dextron_bench.reaches.minjerk import MinjerkSource
+from dextron_bench.splits import building as partition
+from dextron_bench.splits import building_minjerk as partition_minjerk
+from dextron_bench.splits import loading as splits
+from dextron_bench.splits.building import Sizes, TooFewRows
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.minjerk import MinjerkSource
 
 SIZES = Sizes(evaluated=20, val=10, open=5, subjects=2, reaches=0.25)
 

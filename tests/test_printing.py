@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from dextron_bench.verbs import printing
+from dextron_bench.cli import output as printing
 
 
 class Terminal:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.isolation.process import Process, Silent
+from dextron_bench.methods.isolation.process import Process, Silent
 
 ONCE = "print(input()); raise SystemExit(7)"
 CHATTER = "while True: print('more', flush=True)"

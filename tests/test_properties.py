@@ -13,8 +13,8 @@ import rerun as rr
 from test_recording import PATH, PROPERTIES, SETTING, episode
 
 from dextron_bench import recording
-from dextron_bench.recording import glance
-from dextron_bench.recording.properties import NEEDED
+from dextron_bench.recording import reader_process as glance
+from dextron_bench.recording.summaries import NEEDED
 
 DEADLY = """
 import json, os, sys

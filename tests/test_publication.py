@@ -11,8 +11,11 @@ import pytest
 import tiny
 import toy_world
 
-from dextron_bench import cli, leaderboard, records, weights
-from dextron_bench.diagnosis import CAUSES
+from dextron_bench.cli import main as cli
+from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.methods import weights
+from dextron_bench.runs import run_files as records
+from dextron_bench.scores import standings as leaderboard
 
 
 @pytest.fixture

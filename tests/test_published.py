@@ -9,10 +9,16 @@ from pathlib import Path
 import pytest
 
 import baselines
-from dextron_bench import cli, lessons, methods, records, rollout, splits, weights
-from dextron_bench.learning import Learner
+from dextron_bench.cli import main as cli
+from dextron_bench.evaluation import rollout
+from dextron_bench.methods import registry as methods
+from dextron_bench.methods import weights
+from dextron_bench.methods.learners import Learner
+from dextron_bench.reaches.setting import Source
+from dextron_bench.runs import run_files as records
+from dextron_bench.splits import loading as splits
 from dextron_bench.storage import atomic, tensors
-from dextron_bench.world.setting import Source
+from dextron_bench.training import jobs as lessons
 
 BOARD = Path(__file__).parents[1] / "leaderboard"
 RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))

@@ -13,7 +13,7 @@ from conftest import START, Published
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dextron_bench.world import raw
+from dextron_bench.reaches.recorded import parsing as raw
 
 FILE, NOTES = "extracts/01_fl_06.json", "extracts/meta/01_fl_06_meta.json"
 GOOD = [["start", 0.0], ["reached", 1.0], ["top", 2.0]]

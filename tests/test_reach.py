@@ -7,8 +7,8 @@ from pathlib import Path as File
 import numpy as np
 import pytest
 
-from dextron_bench.world import rotation
-from dextron_bench.world.reach import (
+from dextron_bench.reaches import rotation
+from dextron_bench.reaches.reach import (
     PALM_AHEAD,
     PALM_CENTRE,
     Curve,
@@ -158,7 +158,7 @@ JUMPS = {"08_fr_16", "08_nr_04"}  # Recordings in which the tracker lost the han
 
 @pytest.mark.slow
 def test_every_real_reach_becomes_a_sound_path_at_human_speed(release: File):
-    from dextron_bench.world.release import Manifest, read
+    from dextron_bench.reaches.recorded.release import Manifest, read
 
     reaches = read(release, Manifest.load())
     assert len(reaches) == 575

@@ -21,10 +21,14 @@ from rerun.chunk import Chunk, RrdReader
 from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.predictions import Insight
-from dextron_bench.recording import archive, layout, scene, storage
+from dextron_bench.reaches import reach
+from dextron_bench.reaches.setting import Setting
+from dextron_bench.recording import blueprint as layout
+from dextron_bench.recording import episode_file as archive
+from dextron_bench.recording import rrd_file as storage
+from dextron_bench.recording import scene
 from dextron_bench.success.network import GRID
-from dextron_bench.world import model, reach, task
-from dextron_bench.world.setting import Setting
+from dextron_bench.world import model, task
 
 PROPERTIES: dict[str, recording.Value] = {
     "method": "bc",

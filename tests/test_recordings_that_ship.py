@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from dextron_bench import recording
-from dextron_bench.replay import replay
-from dextron_bench.world import model, sources
+from dextron_bench.evaluation.replay import replay
+from dextron_bench.reaches import sources
+from dextron_bench.world import model
 
 FOLDER = Path(__file__).parents[1] / "recordings"
 FILES = sorted(FOLDER.glob("*.rrd"))

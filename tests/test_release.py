@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from conftest import NAMES, Published
 
-from dextron_bench.world import archive
-from dextron_bench.world.release import MAX_FILE, Manifest, ReleaseError
-from dextron_bench.world.release import read as read_release
+from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded.release import MAX_FILE, Manifest, ReleaseError
+from dextron_bench.reaches.recorded.release import read as read_release
 
 FILE = "extracts/01_fl_06.json"
 

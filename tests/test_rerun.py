@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from forging import Forgery
 
-from dextron_bench.submission import contest
+from dextron_bench.leaderboard.submission import playing as contest
 
 
 def test_an_agent_that_did_not_play_these_episodes_is_caught(forged: Forgery):

@@ -12,10 +12,13 @@ import pytest
 import tiny
 from rerun.chunk import RrdReader
 
-from dextron_bench import gallery, records, restoration, run
-from dextron_bench.gallery import Wish
-from dextron_bench.restoration import Unplayable
-from dextron_bench.run import Plan
+from dextron_bench.runs import execution as run
+from dextron_bench.runs import rerecording as restoration
+from dextron_bench.runs import run_files as records
+from dextron_bench.runs import selection as gallery
+from dextron_bench.runs.execution import Plan
+from dextron_bench.runs.rerecording import Unplayable
+from dextron_bench.runs.selection import Wish
 from dextron_bench.storage import atomic
 
 ALL = Wish(worst=9)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.experts import Case, Expert, ExpertAgent
-from dextron_bench.rollout import AgentError, fault, rollout
-from dextron_bench.world.minjerk import MinjerkSource
-from dextron_bench.world.setting import Setting
+from dextron_bench.evaluation.rollout import AgentError, fault, rollout
+from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.reaches.minjerk import MinjerkSource
+from dextron_bench.reaches.setting import Setting
 
 SOURCE = MinjerkSource()
 CASES = [Case(Setting(SOURCE.names[i], 0.0, 0.0, 0.0), Expert(2.0, d_c), 0.0) for i, d_c in enumerate([0.15, 0.9, 0.1])]

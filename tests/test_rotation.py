@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dextron_bench.world import rotation
+from dextron_bench.reaches import rotation
 
 HALF = np.sqrt(0.5)
 NONE = np.array([1.0, 0.0, 0.0, 0.0])

@@ -14,15 +14,18 @@ import pytest
 import tiny
 from brief import SETTINGS, SOURCE
 
-from dextron_bench import recording, records, run, splits
-from dextron_bench.experts import ExpertAgent
-from dextron_bench.replay import replay
-from dextron_bench.rollout import rollout
-from dextron_bench.run import Plan
+from dextron_bench import recording
+from dextron_bench.evaluation.replay import replay
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.policies import ExpertAgent
+from dextron_bench.reaches.setting import from_frame
+from dextron_bench.runs import execution as run
+from dextron_bench.runs import run_files as records
+from dextron_bench.runs.execution import Plan
+from dextron_bench.splits import loading as splits
 from dextron_bench.storage import atomic, provenance
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
-from dextron_bench.world.setting import from_frame
 
 PLAN = Plan("exp", "synthetic", ("val", "test"), seed=0)
 AGENT = """

@@ -12,7 +12,8 @@ from test_recording import PATH, episode
 
 from dextron_bench import recording
 from dextron_bench.recording import scene, shapes
-from dextron_bench.world import dressing, model, task
+from dextron_bench.world import model, task
+from dextron_bench.world.rendering import visuals as dressing
 
 
 def test_poses_contacts_and_signals_are_read_back_as_they_are(tmp_path: Path) -> None:

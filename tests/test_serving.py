@@ -15,7 +15,7 @@ from urllib.parse import unquote
 
 import pytest
 
-from dextron_bench import serving
+from dextron_bench.leaderboard import server as serving
 
 PAGE = '<a href="../recordings/a%2Bb-success.rrd">success</a>'
 
@@ -122,7 +122,7 @@ def test_a_folder_without_a_page_is_told(tmp_path: Path, complaint: Callable[...
 
 SERVED = """
 import signal
-from dextron_bench.cli import main
+from dextron_bench.cli.main import main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # Which what started the tests may have switched off.
 raise SystemExit(main(["leaderboard", "serve", "--port", "0"]))
 """

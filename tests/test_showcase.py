@@ -9,7 +9,10 @@ import opinion
 import pytest
 import tiny
 
-from dextron_bench import cli, gallery, recording, showcase
+from dextron_bench import recording
+from dextron_bench.cli import main as cli
+from dextron_bench.leaderboard import highlights as showcase
+from dextron_bench.runs import selection as gallery
 from dextron_bench.success import network
 
 

@@ -10,13 +10,16 @@ import pandas as pd
 import pytest
 import tiny
 
-from dextron_bench import experts, partition, partition_minjerk, splits
-from dextron_bench.experts import ExpertAgent
-from dextron_bench.partition import SETTING
-from dextron_bench.rollout import rollout
-from dextron_bench.splits import DamagedSplit, UnknownSplit
-from dextron_bench.world.setting import OFFSET, Source
-from dextron_bench.world.sources import open_source
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts import policies as experts
+from dextron_bench.experts.policies import ExpertAgent
+from dextron_bench.reaches.setting import OFFSET, Source
+from dextron_bench.reaches.sources import open_source
+from dextron_bench.splits import building as partition
+from dextron_bench.splits import building_minjerk as partition_minjerk
+from dextron_bench.splits import loading as splits
+from dextron_bench.splits.building import SETTING
+from dextron_bench.splits.loading import DamagedSplit, UnknownSplit
 
 SHIPPED = splits.everything()
 SOURCES = sorted({reaches for reaches, _ in SHIPPED})

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from dextron_bench import paired, stats
+from dextron_bench.scores import paired
+from dextron_bench.scores import statistics as stats
 
 BOARDS = 300  # Simulated ones. 95 % of them are held give or take 2.5 %, by two standard errors.
 BOTH = np.array([0, 0, 0, 0, 1, 1, 1, 1])

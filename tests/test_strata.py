@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench import splits
-from dextron_bench.strata import REGION, SUBJECT, by_stratum, regions, strata
-from dextron_bench.world.setting import Source
+from dextron_bench.reaches.setting import Source
+from dextron_bench.splits import loading as splits
+from dextron_bench.splits.strata import REGION, SUBJECT, by_stratum, regions, strata
 
 
 @pytest.mark.parametrize(("reaches", "split"), [(r, s) for r, s in splits.everything() if s == "test"])

@@ -14,15 +14,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.floors import Nothing
-from dextron_bench.experts import Case, Expert
+from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.storage import folder_config, tensors
-from dextron_bench.success import judgement
-from dextron_bench.success.collection import POLICY, SOLVED, UNIFORM, BadCollection, Collection, Tally, collect, draw
-from dextron_bench.success.collection import file_of as block_file
+from dextron_bench.success import metrics as judgement
 from dextron_bench.success.dataset import BadDataset, Dataset, EmptyDataset
-from dextron_bench.success.fit import MODEL, STATE, BadFit, Fit, fit
-from dextron_bench.success.fit import network as fit_network
+from dextron_bench.success.generation import POLICY, SOLVED, UNIFORM, BadCollection, Collection, Tally, collect, draw
+from dextron_bench.success.generation import file_of as block_file
 from dextron_bench.success.network import GRID, SIZES, BadModel, MissingModel, SuccessModel, shipped
+from dextron_bench.success.training import MODEL, STATE, BadFit, Fit, fit
+from dextron_bench.success.training import network as fit_network
 
 TRAIN = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 SMALL = Collection("synthetic", block=5, policies=("nothing",))

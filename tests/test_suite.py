@@ -10,9 +10,9 @@ import pytest
 from brief import SETTINGS, SOURCE, actions, played
 from dm_control.rl import control
 
+from dextron_bench.reaches.sources import UnknownSource
 from dextron_bench.world import model, suite
-from dextron_bench.world.faces import ActionError
-from dextron_bench.world.sources import UnknownSource
+from dextron_bench.world.environment import ActionError
 
 
 def episode(env: control.Environment, rng: np.random.Generator) -> Iterator[dm_env.TimeStep]:

@@ -13,11 +13,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dextron_bench.world import rotation, synthetic, synthetic_fit
-from dextron_bench.world.reach import CONTROL_STEP, SETTLE, Reach, palm_centre, path
-from dextron_bench.world.setting import Stratum, UnknownReach
-from dextron_bench.world.sources import open_source
-from dextron_bench.world.synthetic_encode import encode, log_stretches
+from dextron_bench.reaches import rotation
+from dextron_bench.reaches.reach import CONTROL_STEP, SETTLE, Reach, palm_centre, path
+from dextron_bench.reaches.setting import Stratum, UnknownReach
+from dextron_bench.reaches.sources import open_source
+from dextron_bench.reaches.synthetic import fitting as synthetic_fit
+from dextron_bench.reaches.synthetic import generator as synthetic
+from dextron_bench.reaches.synthetic.encoding import encode, log_stretches
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 

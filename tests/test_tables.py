@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 from forging import Forgery, row
 
-from dextron_bench import records
+from dextron_bench.runs import run_files as records
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_two_columns_of_a_name_are_refused(forged: Forgery):
 
 def test_more_row_groups_than_a_run_writes_are_refused(forged: Forgery, monkeypatch: pytest.MonkeyPatch):
     file = forged.seed / records.EPISODES
-    monkeypatch.setattr("dextron_bench.submission.tables.GROUPS", 3)
+    monkeypatch.setattr("dextron_bench.leaderboard.submission.episode_tables.GROUPS", 3)
     pq.write_table(pq.read_table(file), file, row_group_size=1)
     assert "has 4 row groups; 3 are plenty" in forged.checked().problems[0]
 

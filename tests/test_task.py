@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dextron_bench.reaches.reach import Path
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.reach import Path
 
 HALF = np.sqrt(0.5)
 

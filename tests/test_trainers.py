@@ -15,8 +15,8 @@ from baselines.cycle import Cycle
 from baselines.demonstrations import of
 from baselines.policy import MeanAgent
 from baselines.schedule import Schedule
-from dextron_bench.experts import Case, Expert
-from dextron_bench.learning import Track, Trainer
+from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.methods.learners import Track, Trainer
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 SCHEDULE = Schedule(epochs=4, warm_start=60, period=1)

@@ -15,14 +15,16 @@ import tiny
 import toy_world
 from toy_learner import Linear, Toy, ToyTrainer
 
-from dextron_bench import curve, splits, training
-from dextron_bench.checkpoints import Busy, Checkpoints
-from dextron_bench.learning import Heir, Learner, Track
-from dextron_bench.rollout import AgentError
+from dextron_bench.evaluation.rollout import AgentError
+from dextron_bench.methods.learners import Heir, Learner, Track
+from dextron_bench.splits import loading as splits
 from dextron_bench.storage import atomic, provenance, tensors
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
-from dextron_bench.training import Diverged
+from dextron_bench.training import learning_curve as curve
+from dextron_bench.training import loop as training
+from dextron_bench.training.checkpoints import Busy, Checkpoints
+from dextron_bench.training.loop import Diverged
 
 QUICK = Toy(preset="quick")  # 5 epochs, checkpoints after 2, 4 and 5.
 SEEDS = (0, 3)

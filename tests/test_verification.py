@@ -13,11 +13,14 @@ import pytest
 import tiny
 from forging import Forgery, row
 
-from dextron_bench import recording, records, splits
-from dextron_bench.isolation.agent import Limits
+from dextron_bench import recording
+from dextron_bench.leaderboard.submission import playing as contest
+from dextron_bench.leaderboard.submission import result_check as differences
+from dextron_bench.methods.isolation.isolated_agent import Limits
+from dextron_bench.reaches import sources
+from dextron_bench.runs import run_files as records
+from dextron_bench.splits import loading as splits
 from dextron_bench.storage import provenance
-from dextron_bench.submission import contest, differences
-from dextron_bench.world import sources
 
 
 def test_a_sound_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forged: Forgery):

@@ -12,8 +12,8 @@ from pathlib import Path
 import pandas as pd
 from brief import SOURCE
 
-from dextron_bench import splits
-from dextron_bench.world import sources
+from dextron_bench.reaches import sources
+from dextron_bench.splits import loading as splits
 
 NAME = "synthetic"  # What the source is called, since the command line knows it.
 COLUMNS = ["split", "reach", "offset_x", "offset_y", "duration_noise", "gain", "critical", "window"]
@@ -34,7 +34,7 @@ import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
 import tiny
 tiny.install(Path(sys.argv.pop(1)))
-from dextron_bench.cli import main
+from dextron_bench.cli.main import main
 sys.exit(main())
 """
 

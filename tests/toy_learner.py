@@ -9,8 +9,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from dextron_bench.learning import Arrays, Track, Trainer
-from dextron_bench.rollout import Agent
+from dextron_bench.evaluation.rollout import Agent
+from dextron_bench.methods.learners import Arrays, Track, Trainer
 from dextron_bench.world import model
 
 EPOCHS = {"paper": 12, "quick": 5, "smoke": 2}

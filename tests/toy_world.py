@@ -10,7 +10,7 @@ import pandas as pd
 import tiny
 from brief import SOURCE
 
-from dextron_bench.world import sources
+from dextron_bench.reaches import sources
 
 TRAIN = pd.DataFrame([("train", *tiny.SOLVED[0]), ("train", *tiny.SOLVED[1])], columns=tiny.COLUMNS)
 TOY = f"{Path(__file__).with_name('toy_learner.py')}:Toy"

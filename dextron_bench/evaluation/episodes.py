@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dextron_bench.reaches.setting import Setting
 from dextron_bench.storage import hashing
 from dextron_bench.world import task
-from dextron_bench.world.setting import Setting
 
 SHORT = 12  # Hexadecimal digits of a hash of actions in a result.
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dextron_bench import experts
-from dextron_bench.experts import Expert
+from dextron_bench.experts import policies as experts
+from dextron_bench.experts.policies import Expert
 from dextron_bench.world import task
 
 

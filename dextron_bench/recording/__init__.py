@@ -3,13 +3,13 @@
 The only package that talks to Rerun.
 """
 
-from dextron_bench.recording.archive import BrokenRecording, Recorded, Value, read, write
+from dextron_bench.recording.episode_file import BrokenRecording, Recorded, Value, read, write
+from dextron_bench.recording.live_view import Stage, theatre
 from dextron_bench.recording.pair import UnequalSettings, pair
-from dextron_bench.recording.properties import ReaderError, Summary, read_safely, read_screened, screen, summarise
-from dextron_bench.recording.stage import Stage, theatre
-from dextron_bench.recording.storage import UnwritableRecording
+from dextron_bench.recording.rrd_file import UnwritableRecording
+from dextron_bench.recording.summaries import ReaderError, Summary, read_safely, read_screened, screen, summarise
 from dextron_bench.recording.viewer import ViewerError, screenshots, view
-from dextron_bench.recording.webviewer import web_viewer
+from dextron_bench.recording.web_viewer import web_viewer
 
 __all__ = [
     "BrokenRecording",

@@ -9,9 +9,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 
-from dextron_bench.recording import layout, scene, storage
-from dextron_bench.recording.archive import Recorded
-from dextron_bench.recording.properties import PAIR, read_safely
+from dextron_bench.recording import blueprint as layout
+from dextron_bench.recording import rrd_file as storage
+from dextron_bench.recording import scene
+from dextron_bench.recording.episode_file import Recorded
+from dextron_bench.recording.summaries import PAIR, read_safely
 
 SIDES = "/a", "/b"
 PLOTS = {  # Title of each plot, what of each side is in it, and its range.

@@ -9,8 +9,9 @@ import numpy as np
 import rerun as rr
 from rerun.chunk import Chunk
 
+from dextron_bench.reaches import reach
 from dextron_bench.recording import shapes
-from dextron_bench.world import model, reach, task
+from dextron_bench.world import model, task
 
 TRACE = "/world/trace"  # One leg a step; the layout shows those up to now.
 CONTACTS = "/world/contacts"

@@ -15,7 +15,8 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from dextron_bench.world import dressing, rotation
+from dextron_bench.reaches import rotation
+from dextron_bench.world.rendering import visuals as dressing
 
 XYZW = [1, 2, 3, 0]  # Rerun puts the scalar part of a quaternion last.
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)

@@ -32,7 +32,7 @@ def _version(name: str) -> str | None:
 
 
 def _git(*words: str) -> str | None:
-    here = Path(__file__).resolve().parent
+    here = Path(__file__).resolve().parents[1]
     if not (here.parent / ".git").exists():
         return None
     try:

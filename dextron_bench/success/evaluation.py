@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench import experts
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.experts import Case, Expert, ExpertAgent
-from dextron_bench.rollout import Agent, rollout
-from dextron_bench.success import judgement
-from dextron_bench.success.judgement import Judgement
+from dextron_bench.evaluation.rollout import Agent, rollout
+from dextron_bench.experts import policies as experts
+from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.reaches.setting import Source
+from dextron_bench.success import metrics as judgement
+from dextron_bench.success.metrics import Judgement
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.world import model as world
-from dextron_bench.world.setting import Source
 
 PARTS = 10  # Of a reach, in each of which the AUC is told; what comes after its end is one more.
 

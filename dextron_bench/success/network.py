@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.exact import Perceptron, rounded
+from dextron_bench.methods.exact import Perceptron, rounded
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from mujoco.batch import Batch
 
+from dextron_bench.reaches.reach import PALM_AHEAD, Path
 from dextron_bench.world import model, task
-from dextron_bench.world.reach import PALM_AHEAD, Path
 
 
 @dataclass(frozen=True, slots=True)

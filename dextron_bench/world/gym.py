@@ -17,10 +17,10 @@ from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.faces import Settings, checked
-from dextron_bench.world.setting import Setting, Source
+from dextron_bench.world.environment import Settings, checked
 
 FRAME = (480, 360)  # [px] width and height of rendered frames.
 LARGEST = 1e10  # MuJoCo calls a simulation with numbers beyond this unstable.
@@ -39,7 +39,7 @@ def action_space() -> Box:
 
 def pictures(states: np.ndarray) -> np.ndarray:
     """Pictures (n, H, W, 3), 8 bit, of states (n, 48)."""
-    from dextron_bench.world import appearance  # Loads OpenGL, which most runs never need.
+    from dextron_bench.world.rendering import renderer as appearance  # Loads OpenGL, which most runs never need.
 
     return appearance.frames(states, *FRAME)
 

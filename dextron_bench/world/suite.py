@@ -12,10 +12,10 @@ from dm_control.mujoco import wrapper
 from dm_control.rl import control
 from dm_env import specs
 
+from dextron_bench.reaches.reach import PALM_AHEAD, Path
+from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import model, task
-from dextron_bench.world.faces import Settings, checked
-from dextron_bench.world.reach import PALM_AHEAD, Path
-from dextron_bench.world.setting import Setting, Source
+from dextron_bench.world.environment import Settings, checked
 
 
 def load(

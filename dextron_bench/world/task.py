@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dextron_bench.world import model, rotation
-from dextron_bench.world.reach import PALM_CENTRE
+from dextron_bench.reaches import rotation
+from dextron_bench.reaches.reach import PALM_CENTRE
+from dextron_bench.world import model
 
 STEP_LIMIT = 500  # Control steps in an episode: 10 s.
 LIFTED = 0.25  # [m] height of the bottle's centre from which a step is rewarded.

@@ -12,12 +12,12 @@ from mujoco.batch import Batch
 from pytest_benchmark.fixture import BenchmarkFixture
 from workload import Prepared, cases, reaches
 
-from dextron_bench import experts, rollout
-from dextron_bench.evaluation import episodes
-from dextron_bench.experts import ExpertAgent
+from dextron_bench.evaluation import episodes, rollout
+from dextron_bench.experts import policies as experts
+from dextron_bench.experts.policies import ExpertAgent
+from dextron_bench.reaches.reach import Path
 from dextron_bench.world import model
 from dextron_bench.world.engine import Engine, Step
-from dextron_bench.world.reach import Path
 
 EPISODES, SLOTS, ROUNDS = 192, 96, 3
 INPUTS = ("ctrl", "mocap_pos", "mocap_quat")

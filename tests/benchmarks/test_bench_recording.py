@@ -12,11 +12,12 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from rerun.chunk import RrdReader
 from workload import Prepared, cases
 
-from dextron_bench import recording, records, rollout
-from dextron_bench.evaluation import episodes
-from dextron_bench.experts import ExpertAgent
-from dextron_bench.splits import Split
-from dextron_bench.success import insight
+from dextron_bench import recording
+from dextron_bench.evaluation import episodes, rollout
+from dextron_bench.experts.policies import ExpertAgent
+from dextron_bench.runs import run_files as records
+from dextron_bench.splits.loading import Split
+from dextron_bench.success import predict as insight
 from dextron_bench.success.network import SIZES, SuccessModel
 
 ROUNDS, EPISODES, FILES = 3, 32, 200

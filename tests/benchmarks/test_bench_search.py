@@ -13,13 +13,14 @@ from measure import Row, alone, in_turns, note, scaled
 from pytest_benchmark.fixture import BenchmarkFixture
 from workload import reaches
 
-from dextron_bench import blocks, montecarlo, opening
-from dextron_bench.montecarlo import Search
-from dextron_bench.world import archive
+from dextron_bench.experts import blocks, montecarlo
+from dextron_bench.experts import branching as opening
+from dextron_bench.experts.montecarlo import Search
+from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.setting import Setting, Source
+from dextron_bench.reaches.sources import open_source
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.reach import Path
-from dextron_bench.world.setting import Setting, Source
-from dextron_bench.world.sources import open_source
 
 SETTINGS, ROUNDS = 128, 2
 PAPER = 1 / 90  # Rows above 1 for each second of one thread of the paper's cluster.

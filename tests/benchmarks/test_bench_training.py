@@ -18,7 +18,7 @@ from workload import cases, reaches
 from baselines.cycle import FRAMES, Cycle
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import Schedule
-from dextron_bench.learning import Track
+from dextron_bench.methods.learners import Track
 
 ROUNDS = 5
 FILLED = 1000  # Transitions in the peer's buffer.

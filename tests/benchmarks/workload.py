@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 
-from dextron_bench import montecarlo
-from dextron_bench.experts import Case, Expert
-from dextron_bench.world import setting
-from dextron_bench.world.archive import MissingData
-from dextron_bench.world.reach import Path
-from dextron_bench.world.setting import Setting, Source
-from dextron_bench.world.sources import open_source
+from dextron_bench.experts import montecarlo
+from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.reaches import setting
+from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.recorded.cache import MissingData
+from dextron_bench.reaches.setting import Setting, Source
+from dextron_bench.reaches.sources import open_source
 
 
 @cache

@@ -1,0 +1,37 @@
+"""`dextron-bench list`: what there is to run, and what was run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dextron_bench.cli.output import print_table
+
+
+@dataclass(frozen=True)
+class List:
+    """List methods, splits and the runs in a folder.
+
+    Example: dextron-bench list
+    """
+
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+
+    def __call__(self) -> int:
+        from dextron_bench.methods import registry as methods
+        from dextron_bench.runs import run_files as records
+        from dextron_bench.splits import loading as splits
+        from dextron_bench.training import jobs as lessons
+
+        about = [(name, methods.describe(name)) for name in methods.known()]
+        found = [splits.load(*names) for names in splits.everything()]
+        rows = [(split.reaches, split.name, len(split.cases), split.digest[:8]) for split in found]
+        print_table("methods", ["name", "what it is"], about)
+        print_table("splits", ["reaches", "split", "rows", "version"], rows)
+        done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in records.results(self.runs)]
+        under_way = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in lessons.under_way(self.runs)]
+        if under_way:
+            print_table(f"trainings in {self.runs}", ["method", "reaches", "seeds", "left"], under_way)
+        print_table(f"runs in {self.runs}", ["method", "reaches", "seed", "splits"], done)
+        return 0

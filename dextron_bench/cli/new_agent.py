@@ -1,0 +1,29 @@
+"""`dextron-bench new-agent`: a small agent to begin with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+
+@dataclass(frozen=True)
+class NewAgent:
+    """Write a small agent that works, and its test, into a new folder.
+
+    Example: dextron-bench new-agent my_agent
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """The folder to make."""
+
+    def __call__(self) -> int:
+        from dextron_bench.leaderboard.submission import starter as starting
+
+        for file in starting.begin(self.folder):
+            print(file)
+        print(f"try it:    dextron-bench check {self.folder}/agent.py:MyAgent")
+        print(f"score it:  dextron-bench run --method {self.folder}/agent.py:MyAgent")
+        print(f"submit it: dextron-bench submit {self.folder}/agent.py:MyAgent --name my-agent  (docs/agents.md)")
+        return 0

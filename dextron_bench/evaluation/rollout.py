@@ -1,0 +1,155 @@
+"""Any agent on any list of settings, N at once, to episodes; the only evaluation loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.reaches.setting import Source
+from dextron_bench.world import model, task
+from dextron_bench.world.engine import Engine, Step
+
+SLOTS = 256  # Episodes at once. Fixed, because an entrant's last bits may depend on the batch (see `exact`).
+
+
+class Agent(Protocol):
+    """Acts in N episodes at once; may keep memory per episode."""
+
+    def reset(self, episodes: np.ndarray) -> None:
+        """Tells that rows `episodes` (n,) of the states to come begin a new episode."""
+        ...
+
+    def act(self, states: np.ndarray) -> np.ndarray:
+        """Maps states (N, 48) to closing speeds (N, 1) in [-1, 1]. N stays the same from call to call."""
+        ...
+
+
+@runtime_checkable
+class Privileged(Protocol):
+    """An agent that is told each setting's own expert: EXP, and no other on the leaderboard."""
+
+    def assign(self, episodes: np.ndarray, experts: Sequence[Expert]) -> None:
+        """Comes before `reset`: rows `episodes` (n,) are about to play these experts' settings."""
+        ...
+
+
+class AgentError(ValueError):
+    """An agent that raises, or whose actions are not of the agreed shape."""
+
+
+class AgentDown(RuntimeError):
+    """Raised in `act` by an agent that can start again: it fails the episodes that are being played, and no others."""
+
+
+@contextmanager
+def blaming(what: str) -> Iterator[None]:
+    """Makes what an entrant's own code raises an AgentError that says where: `what`, a phrase like "act()"."""
+    try:
+        yield
+    except (AgentDown, AgentError):
+        raise
+    except Exception as error:
+        raise AgentError(f"{what} raised {type(error).__name__}: {error}; --debug shows where") from error
+
+
+def rollout(
+    agent: Agent, source: Source, cases: Sequence[Case], slots: int = SLOTS, threads: int = 0
+) -> Iterator[tuple[int, Episode]]:
+    """Plays every case once; yields (index of the case, episode) as episodes end.
+
+    Raises AgentError where the agent raises or actions have a wrong shape. An action that is not finite or lies outside
+    [-1, 1] fails its own episode and no other; AgentDown fails those that are being played.
+    """
+    return _Evaluation(agent, source, cases, Engine(min(slots, max(len(cases), 1)), threads)).run()
+
+
+class _Evaluation:
+    """Slots with a case each, refilled as episodes end."""
+
+    def __init__(self, agent: Agent, source: Source, cases: Sequence[Case], engine: Engine) -> None:
+        n = engine.slots
+        self._agent, self._source, self._cases, self._engine = agent, source, cases, engine
+        self._next = 0
+        self._case = np.full(n, -1)
+        self._length = np.zeros(n, int)
+        self._states = np.zeros((n, task.STEP_LIMIT + 1, model.STATE))
+        self._actions = np.zeros((n, task.STEP_LIMIT, 1))
+        self._rewards = np.zeros((n, task.STEP_LIMIT))
+        self._now = np.zeros((n, model.STATE))
+
+    def run(self) -> Iterator[tuple[int, Episode]]:
+        """Yields every case's episode."""
+        self._refill(np.arange(self._engine.slots))
+        while (live := np.flatnonzero(self._case >= 0)).size:
+            try:
+                actions = self._ask()
+            except AgentDown as error:
+                yield from [self._episode(slot, failure=str(error)) for slot in live.tolist()]
+                self._refill(live)
+                continue
+            allowed = np.abs(actions[live, 0]) <= 1.0  # False for NaN.
+            sound, faulty = live[allowed], live[~allowed]
+            step = self._engine.step(sound, actions[sound])
+            self._note(sound, actions[sound], step)
+            ended = np.flatnonzero(step.ended)
+            yield from [self._episode(sound[i], bool(step.terminated[i]), bool(step.truncated[i])) for i in ended]
+            yield from [self._episode(slot, failure=fault(actions[slot, 0])) for slot in faulty]
+            self._refill(np.union1d(sound[ended], faulty))
+
+    def _ask(self) -> np.ndarray:
+        with blaming("the agent's act()"):
+            actions = np.asarray(self._agent.act(self._now.copy()))
+        if actions.shape != (len(self._now), 1) or actions.dtype.kind != "f":
+            raise AgentError(
+                f"act() must return floats of shape ({len(self._now)}, 1) for states of shape {self._now.shape}; "
+                f"it returned {actions.dtype} of shape {actions.shape}"
+            )
+        return actions.astype(np.float64)
+
+    def _refill(self, slots: np.ndarray) -> None:
+        """Gives the next cases to free slots; slots that get none fall idle."""
+        self._case[slots] = -1
+        slots = slots[: len(self._cases) - self._next]
+        if not slots.size:
+            return
+        cases = self._cases[self._next : self._next + len(slots)]
+        self._case[slots] = self._next + np.arange(len(slots))
+        self._next += len(slots)
+        states = self._engine.begin(slots, [self._source.path(case.setting) for case in cases])
+        self._states[slots, 0] = self._now[slots] = states
+        self._length[slots] = 0
+        if isinstance(self._agent, Privileged):
+            self._agent.assign(slots, [case.expert for case in cases])
+        with blaming("the agent's reset()"):
+            self._agent.reset(slots)
+
+    def _note(self, slots: np.ndarray, actions: np.ndarray, step: Step) -> None:
+        at = self._length[slots]
+        self._actions[slots, at], self._rewards[slots, at] = actions, step.rewards
+        self._states[slots, at + 1] = self._now[slots] = step.states
+        self._length[slots] += 1
+
+    def _episode(
+        self, slot: int, terminated: bool = False, truncated: bool = False, failure: str = ""
+    ) -> tuple[int, Episode]:
+        """The number of the slot's case, and its episode."""
+        n = self._length[slot]
+        return int(self._case[slot]), Episode(
+            self._cases[self._case[slot]].setting,
+            self._states[slot, : n + 1].copy(),
+            self._actions[slot, :n].copy(),
+            self._rewards[slot, :n].copy(),
+            terminated,
+            truncated,
+            failure and f"{failure} at step {n}",
+        )
+
+
+def fault(action: float) -> str:
+    """What is wrong with an action that may not be played."""
+    return f"action {action:g} is outside [-1, 1]" if np.isfinite(action) else f"action is {action}"

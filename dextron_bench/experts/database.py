@@ -1,0 +1,123 @@
+"""Expert databases G_s: the draws of a search that grasped, with the statistics of all that were tried."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from dataclasses import asdict
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from dextron_bench.experts import blocks, montecarlo
+from dextron_bench.reaches import setting
+from dextron_bench.storage import atomic, hashing, provenance
+from dextron_bench.world import model, task
+
+BANDS = 9  # Equal bands of d_c in the statistics.
+
+
+class DamagedDatabase(ValueError):
+    """A database that is not what its summary says."""
+
+
+def save(
+    draws: pd.DataFrame, source: setting.Source, search: montecarlo.Search, folder: Path, name: str
+) -> tuple[Path, dict[str, Any]]:
+    """Writes the kept rows as `<name>.parquet` and a summary as `<name>.json`; returns the file and the summary."""
+    kept = draws[draws["score"] > blocks.KEPT].reset_index(drop=True).astype({"length": int})
+    file = folder / f"{name}.parquet"
+    atomic.write_atomically(file, lambda part: kept.to_parquet(part, compression="zstd"))
+    about = {
+        "search": asdict(search),
+        "digest": digest(kept),
+        "draws": len(draws),
+        "settings": len(draws) // search.experts,
+        "kept": len(kept),
+        "solved": int((kept["score"] == task.SUCCESS).sum()),
+        "statistics": statistics(draws, source).to_dict("records"),
+        "provenance": provenance.collect(model.mjcf_hash()),
+    }
+    atomic.write_json(file.with_suffix(".json"), about)
+    return file, about
+
+
+def load(file: Path) -> pd.DataFrame:
+    """The rows of a database, checked against its summary; raises DamagedDatabase, FileNotFoundError."""
+    expected = summary(file)["digest"]
+    try:
+        rows = pd.read_parquet(file)
+        found = digest(rows)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DamagedDatabase(f"expert database {file} is damaged ({error}); make it again with `mc`") from error
+    if found != expected:
+        raise DamagedDatabase(f"expert database {file} does not fit its summary; make it again with `mc`")
+    return rows
+
+
+def summary(file: Path) -> dict[str, Any]:
+    """What is known of a database: search, counts, statistics, provenance; raises as `load`."""
+    try:
+        found = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise DamagedDatabase(f"summary of expert database {file} is damaged ({error}); make it again") from error
+    if not isinstance(found, dict) or not {"digest", "search", "statistics"} <= set(found):
+        raise DamagedDatabase(f"summary of expert database {file} is not whole; make it again with `mc`")
+    return found
+
+
+def shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """The database that ships for a source of reaches, and its summary; raises FileNotFoundError where none does."""
+    with as_file(files("dextron_bench") / "data") as folder:
+        file = folder / f"experts-{reaches}.parquet"
+        if not file.exists():
+            raise FileNotFoundError(f"no expert database ships for {reaches!r}; make one with `mc`")
+        return load(file), summary(file)
+
+
+def digest(rows: pd.DataFrame) -> str:
+    """SHA-256 of a database's rows in order."""
+    names = "\n".join(rows["reach"]).encode()
+    numbers = rows.drop(columns="reach").sort_index(axis=1)
+    return hashing.digest(names, *(np.ascontiguousarray(numbers[c], "<f8").tobytes() for c in numbers))
+
+
+def statistics(draws: pd.DataFrame, source: setting.Source) -> pd.DataFrame:
+    """Success by subject, ring, angle, start region, d_c [fraction of the first distance] and duration [s].
+
+    Columns: by, value, draws, kept, solved, then `kept_rate` and `solved_rate` in [0, 1].
+    """
+    strata = {name: source.stratum(name) for name in draws["reach"].unique()}
+    of = draws["reach"].map
+    keys = {
+        "all": pd.Series("all", index=draws.index),
+        "subject": of(lambda name: strata[name].subject),
+        "ring": of(lambda name: str(strata[name].ring)),
+        "angle": of(lambda name: str(strata[name].angle)),
+        "region": of(lambda name: f"{strata[name].ring}{strata[name].angle}"),
+        "d_c": _bands(draws["critical"], np.linspace(0.0, 0.9, BANDS + 1)),
+        "duration": _bands(pd.Series([source.duration(s) for s in setting.from_frame(draws)]), np.arange(11.0)),
+    }
+    outcome = pd.DataFrame({"kept": draws["score"] > blocks.KEPT, "solved": draws["score"] == task.SUCCESS})
+    parts = []
+    for by, key in keys.items():
+        counted = outcome.groupby(key, sort=True).agg(["size", "sum"])
+        part = pd.DataFrame(
+            {"draws": counted["kept", "size"], "kept": counted["kept", "sum"], "solved": counted["solved", "sum"]}
+        )
+        parts.append(part.rename_axis("value").reset_index().assign(by=by))
+    table = pd.concat(parts, ignore_index=True)
+    table["kept_rate"], table["solved_rate"] = table["kept"] / table["draws"], table["solved"] / table["draws"]
+    return table[["by", "value", "draws", "kept", "solved", "kept_rate", "solved_rate"]]
+
+
+def _bands(values: pd.Series, edges: np.ndarray) -> pd.Series:
+    """The band that each value lies in, as text."""
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    names = np.array([f"{low:.1f} to {high:.1f}" for low, high in itertools.pairwise(edges)])
+    return pd.Series(names[place], index=values.index)

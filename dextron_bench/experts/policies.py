@@ -1,0 +1,84 @@
+"""The experts Pi_E of the paper: closing that starts at a critical distance (Eq. 1 and 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dextron_bench.world import task
+
+if TYPE_CHECKING:  # The process of an isolated agent imports experts, and may not import settings.
+    from dextron_bench.reaches.setting import Setting
+
+GAIN = (1.0, 1.5)  # K, drawn uniformly (table I).
+CRITICAL_DISTANCE = (0.01, 0.90)  # d_c, as a fraction of the first distance, drawn uniformly (table I).
+OPEN, CLOSED = 0.0, 0.8  # Reference closures of the two phases.
+ALWAYS_CLOSE = 0.03  # [m] distance within which every expert closes.
+
+
+@dataclass(frozen=True, slots=True)
+class Expert:
+    """One policy of Pi_E: gain K and critical normalised distance d_c."""
+
+    gain: float
+    critical: float
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What an agent is tried on: a setting, an expert for it, and the width of the range of d_c that succeeds."""
+
+    setting: Setting
+    expert: Expert
+    window: float
+
+
+def closes(distances: np.ndarray, first: np.ndarray, critical: np.ndarray) -> np.ndarray:
+    """True where an expert is in its closing phase: distances [m], first distances [m], d_c, each (N,)."""
+    return (distances / first < critical) | (distances < ALWAYS_CLOSE)
+
+
+def law(closures: np.ndarray, closing: np.ndarray, gain: np.ndarray) -> np.ndarray:
+    """Closing speeds (N, 1) in [-1, 1] of Eq. 1 for closures, phase and gain K, each (N,)."""
+    target = np.where(closing, CLOSED, OPEN)
+    return np.clip(gain * (target - closures), -1.0, 1.0)[:, None]
+
+
+class ExpertAgent:
+    """Plays the expert that each episode is assigned.
+
+    The first action of an episode is 0; the distance at that step is what later ones are measured by.
+    """
+
+    def __init__(self) -> None:
+        self._gain, self._critical, self._first = np.zeros((3, 0))
+
+    def assign(self, episodes: np.ndarray, experts: Sequence[Expert]) -> None:
+        """Tells that `episodes` (n,) are about to play these experts."""
+        self._make_room(int(episodes.max()) + 1)
+        self._gain[episodes] = [expert.gain for expert in experts]
+        self._critical[episodes] = [expert.critical for expert in experts]
+
+    def reset(self, episodes: np.ndarray) -> None:
+        """Forgets what it saw in `episodes` (n,), which begin anew."""
+        self._first[episodes] = np.nan
+
+    def act(self, states: np.ndarray) -> np.ndarray:
+        """Closing speeds (N, 1) for states (N, 48)."""
+        self._make_room(len(states))
+        distances = task.distance(states)
+        fresh = np.isnan(self._first)
+        self._first = np.where(fresh, distances, self._first)
+        closing = closes(distances, self._first, self._critical)
+        actions = law(task.closure(states), closing, self._gain)
+        actions[fresh] = 0.0
+        return actions
+
+    def _make_room(self, n: int) -> None:
+        missing = n - len(self._first)
+        if missing > 0:
+            self._gain, self._critical = (np.pad(a, (0, missing)) for a in (self._gain, self._critical))
+            self._first = np.pad(self._first, (0, missing), constant_values=np.nan)

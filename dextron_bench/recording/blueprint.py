@@ -1,0 +1,172 @@
+"""How a recording opens: its plots, its text card, and the arrangement of the views."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cache
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.chunk import Chunk
+
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.recording import scene
+from dextron_bench.recording import success_plots as foresight
+from dextron_bench.world import task
+
+EYE, TARGET = (0.66, -0.62, 0.40), (-0.07, -0.10, 0.20)  # [m] whence and whither the 3D view looks.
+LINES = {  # Entity of plotted lines, their names and colours.
+    "/episode/actions": {"action": (255, 150, 50)},
+    "/signals/closure": {"closure": (90, 170, 255)},
+    "/signals/metres": {
+        "palm to bottle": (190, 120, 255),
+        "bottle's height": (90, 210, 140),
+        f"lifted from {task.LIFTED} m": (140, 140, 140),
+    },
+    "/episode/rewards": {"reward": (255, 210, 80)},
+    "/signals/expert": {"expert's action": (120, 200, 120)},
+    "/success/chance": {"predicted success": (90, 150, 230), "threshold": (140, 140, 140)},
+}
+METRES = "Palm's distance, bottle's height [m]"  # The only plot with room for a legend.
+PLOTS = {  # Title of each plot, its lines and their range.
+    "Action (orange), closure (blue)": (("/episode/actions", "/signals/closure"), (-1.1, 1.1)),
+    METRES: (("/signals/metres",), (0.0, 0.7)),
+    "Reward": (("/episode/rewards",), (-0.1, 1.1)),
+}
+FORETOLD = {  # The same where success is foretold.
+    "Action (orange), expert's (green), closure (blue)": (
+        ("/episode/actions", "/signals/closure", "/signals/expert"),
+        (-1.1, 1.1),
+    ),
+    METRES: PLOTS[METRES],
+    "Reward (yellow), predicted success (blue)": (("/episode/rewards", "/success/chance"), (-0.1, 1.1)),
+}
+DIGEST = 64  # Characters of a hash, of which the card shows eight.
+BACKGROUND = (33, 38, 45)
+
+
+def signals(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
+    """What is plotted beside actions and rewards, derived from states (T, 48) from step `first` on."""
+    lifted = np.full(len(states), task.LIFTED)
+    metres = np.stack([task.distance(states), task.bottle_height(states), lifted], axis=1)
+    when = scene.timelines(first, first + len(states) - 1)
+    yield Chunk.from_columns("/signals/closure", when, rr.Scalars.columns(scalars=task.closure(states)))
+    yield Chunk.from_columns("/signals/metres", when, rr.Scalars.columns(scalars=metres))
+
+
+def actions(taken: np.ndarray, first: int = 0) -> Chunk:
+    """The actions (T, 1) that were taken from step `first` on."""
+    when = scene.timelines(first, first + len(taken) - 1)
+    return Chunk.from_columns("/episode/actions", when, rr.Scalars.columns(scalars=taken))
+
+
+def lines() -> list[Chunk]:
+    """Names and colours of the plotted lines, the same for every episode."""
+    return [
+        scene.static(entity, rr.SeriesLines(names=list(looks), colors=list(looks.values()), widths=[2.0] * len(looks)))
+        for entity, looks in LINES.items()
+    ]
+
+
+def outcome(episode: Episode) -> str:
+    """How the episode ended, in a few words."""
+    if episode.failure:
+        return "agent failed"
+    if episode.terminated:
+        return "bottle fell"
+    return "success" if episode.success else "held too briefly" if episode.score else "not lifted"
+
+
+def card(episode: Episode, properties: Mapping[str, object]) -> Chunk:
+    """Outcome, properties and setting, to be read beside the plots."""
+    told = {
+        **properties,
+        "reach": episode.setting.reach,
+        "offset": f"{episode.setting.offset_x * 100:+.1f} cm, {episode.setting.offset_y * 100:+.1f} cm",
+        "duration noise": f"{episode.setting.duration_noise:+.2f}",
+    }
+    told |= {"failure": episode.failure} if episode.failure else {}
+    cells = [f"| {_cell(name.replace('_', ' '))} | {_cell(value)} |" for name, value in told.items()]
+    cells += ["| | |"] * (len(cells) % 2)
+    rows = "\n".join(left + right[1:] for left, right in zip(cells[::2], cells[1::2], strict=True))
+    title = f"### {outcome(episode).capitalize()}: {episode.score:g} of {task.SUCCESS:g}, {len(episode.actions)} steps"
+    table = f"| | | | |\n|---|---|---|---|\n{rows}\n"
+    return scene.static("/card", rr.TextDocument(f"{title}\n\n{table}", media_type="text/markdown"))
+
+
+def _cell(value: object) -> str:
+    text = f"{value:.4g}" if isinstance(value, float) else str(value)
+    text = text[:8] if len(text) == DIGEST else text
+    return text.replace("|", "/")
+
+
+@cache
+def blueprint(foretold: bool = False, live: bool = False) -> rrb.Blueprint:
+    """3D view on the left; card and plots on the right; where success is foretold its curve and its ridge plot too.
+
+    What is `live` is shown as it comes.
+    """
+    text = rrb.TextDocumentView(origin="/card", name="Episode")
+    plots = [_plot(name, *told) for name, told in (FORETOLD if foretold else PLOTS).items()]
+    told = rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3])
+    if foretold:
+        seen = rrb.Vertical(space(), _bars(), row_shares=[5, 2])
+        content = rrb.Horizontal(seen, told, _ridge(), column_shares=[9, 7, 4])
+    else:
+        content = rrb.Horizontal(space(), told, column_shares=[3, 2])
+    return page(content, live)
+
+
+def page(content: rrb.Container, live: bool = False) -> rrb.Blueprint:
+    """Content with the time below it, and nothing else open."""
+    return rrb.Blueprint(
+        content,
+        rrb.TimePanel(timeline="step", fps=50.0, play_state="following" if live else "paused", state="collapsed"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def space(root: str = "", name: str = "Grasp") -> rrb.Spatial3DView:
+    """The 3D view of the world below a root, framed on the grasp."""
+    eye = rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=EYE, look_target=TARGET, eye_up=(0, 0, 1))
+    start, now = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
+    trail = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=now) for line in ("step", "seconds")])
+    return rrb.Spatial3DView(
+        origin=f"{root}/world",
+        name=name,
+        eye_controls=eye,
+        line_grid=False,
+        background=rrb.Background(color=BACKGROUND),
+        overrides={root + scene.TRACE: trail},
+    )
+
+
+def _plot(name: str, entities: tuple[str, ...], span: tuple[float, float]) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        name=name,
+        contents=list(entities),
+        axis_y=rrb.ScalarAxis(range=span, zoom_lock=True),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=name == METRES),
+    )
+
+
+def _bars() -> rrb.BarChartView:
+    contents = [f"/success/{name}" for name in ("curve", "chosen", "scale")]
+    legend = rrb.PlotLegend(visible=False)
+    return rrb.BarChartView(
+        name="Chance of success by action, from open to close", contents=contents, plot_legend=legend
+    )
+
+
+def _ridge() -> rrb.Spatial2DView:
+    bounds = rrb.VisualBounds2D(x_range=(-1.25, 1.25), y_range=(-foresight.HEIGHT - 0.6, 0.4))
+    return rrb.Spatial2DView(
+        origin="/ridge",
+        name="Chances, by share of the reach",
+        background=rrb.Background(color=BACKGROUND),
+        visual_bounds=bounds,
+    )

@@ -1,0 +1,123 @@
+"""Splits: frozen, content-hashed lists of settings, each with an expert and its window of success."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import as_file, files
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.reaches import setting
+from dextron_bench.storage import hashing
+
+NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
+NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "open")
+EVALUATED = ("test", "unseen-reach", "unseen-subject")
+
+
+class UnknownRow(LookupError):
+    """A row that a split does not have."""
+
+
+class UnknownSplit(KeyError):
+    """A split that a source of reaches does not have."""
+
+    def __init__(self, name: str, reaches: str, known: Sequence[str]) -> None:
+        choice = f"choose from {', '.join(known)}" if known else "none ships; see `dextron-bench list`"
+        super().__init__(f"no split {name!r} of {reaches!r} reaches; {choice}")
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class DamagedSplit(ValueError):
+    """A split whose content is not what its hash says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """A named list of cases; `digest` is the SHA-256 of its content, and so its version."""
+
+    name: str
+    reaches: str
+    cases: tuple[Case, ...]
+    digest: str
+
+    def case(self, row: int) -> Case:
+        """The case of a row; raises UnknownRow."""
+        if not 0 <= row < len(self.cases):
+            raise UnknownRow(f"{self.name} of {self.reaches} reaches has rows 0 to {len(self.cases) - 1}, not {row}")
+        return self.cases[row]
+
+
+def known(reaches: str) -> tuple[str, ...]:
+    """Names of the splits that ship for a source of reaches."""
+    return tuple(name for name in NAMES if name in _catalogue().get(reaches, {}))
+
+
+def evaluated(reaches: str) -> tuple[str, ...]:
+    """Names of the shipped splits that rank methods; raises UnknownSplit where there are none."""
+    found = tuple(name for name in known(reaches) if name in EVALUATED)
+    if not found:
+        raise UnknownSplit(EVALUATED[0], reaches, known(reaches))
+    return found
+
+
+def everything() -> list[tuple[str, str]]:
+    """Every shipped split, as (source of reaches, name)."""
+    return [(reaches, name) for reaches in _catalogue() for name in known(reaches)]
+
+
+def load(reaches: str, name: str) -> Split:
+    """The split of that name; raises UnknownSplit, DamagedSplit."""
+    if name not in known(reaches):
+        raise UnknownSplit(name, reaches, known(reaches))
+    table = _table(reaches)
+    try:
+        rows = table[table["split"] == name]
+        found, frozen = digest(rows), _catalogue()[reaches][name]["digest"]
+    except (KeyError, ValueError, TypeError) as error:
+        raise DamagedSplit(f"the splits of {reaches!r} reaches lack {error}; reinstall the package") from error
+    if found != frozen:
+        raise DamagedSplit(
+            f"split {name!r} of {reaches!r} reaches is damaged (hash {found[:12]}); reinstall the package"
+        )
+    return Split(name, reaches, tuple(cases(rows)), found)
+
+
+def cases(rows: pd.DataFrame) -> list[Case]:
+    """The cases of a table with the columns of a setting, `gain`, `critical` and `window`."""
+    experts = zip(rows["gain"], rows["critical"], rows["window"], strict=True)
+    return [
+        Case(each, Expert(float(gain), float(critical)), float(window))
+        for each, (gain, critical, window) in zip(setting.from_frame(rows), experts, strict=True)
+    ]
+
+
+def digest(rows: pd.DataFrame) -> str:
+    """SHA-256 of a split's rows in order: names as UTF-8, numbers as little-endian float64."""
+    names = "\n".join(rows["reach"]).encode()
+    return hashing.digest(names, *(np.ascontiguousarray(rows[c], "<f8").tobytes() for c in NUMBERS))
+
+
+@cache
+def _catalogue() -> dict[str, dict[str, Any]]:
+    try:
+        return json.loads(files("dextron_bench.data").joinpath("splits.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DamagedSplit(f"the catalogue of splits cannot be read ({error}); reinstall the package") from error
+
+
+@cache
+def _table(reaches: str) -> pd.DataFrame:
+    with as_file(files("dextron_bench.data").joinpath(f"splits-{reaches}.parquet")) as file:
+        try:
+            return pd.read_parquet(file)
+        except (OSError, ValueError) as error:
+            raise DamagedSplit(f"the splits of {reaches!r} reaches cannot be read; reinstall the package") from error

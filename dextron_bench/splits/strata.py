@@ -1,0 +1,58 @@
+"""Groups of a split's rows by which scores are told apart: the subject who reached, and where the hand started."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from dextron_bench.reaches import sources
+from dextron_bench.reaches.recorded import parsing as raw
+from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import Split
+from dextron_bench.world import task
+
+SUBJECT, REGION = ("subject",), ("ring", "angle")  # What `by_stratum` groups by.
+
+
+def strata(split: Split) -> pd.DataFrame:
+    """A row for each of the split's, in order: `subject`, `ring` 0 (near) to 3 (far), `angle` 0 (-x) to 3 (-y).
+
+    The recorded reaches' names say this, so that a table of them needs none of the recordings. Raises UnknownReach.
+    """
+    names = [case.setting.reach for case in split.cases]
+    if split.reaches == "real":
+        rows = [raw.origin(name) for name in names]
+    else:
+        source = sources.open_source(split.reaches)
+        found = [source.stratum(name) for name in names]
+        rows = [(each.subject, each.ring, each.angle) for each in found]
+    return pd.DataFrame(rows, columns=["subject", "ring", "angle"])
+
+
+def shipped(reaches: str, name: str, digest: str) -> pd.DataFrame | None:
+    """The strata of a shipped split's rows; None where no split of that name and digest ships. Raises DamagedSplit."""
+    if name not in splits.known(reaches) or (split := splits.load(reaches, name)).digest != digest:
+        return None
+    return strata(split)
+
+
+def regions(reaches: str, name: str, digest: str) -> np.ndarray | None:
+    """The start regions (rows,) of a shipped split's rows as numbers 0 to 15, 4 ring + angle; None as `shipped`."""
+    found = shipped(reaches, name, digest)
+    return None if found is None else (4 * found["ring"] + found["angle"]).to_numpy()
+
+
+def by_stratum(scores: np.ndarray, rows: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
+    """Mean return and success rate of scores (seeds, rows) in each group of a split's rows, those of `strata`.
+
+    `by` is SUBJECT or REGION; its columns come first, then `rows` (how many), `return` (0 to 20), `success` (0 to 1).
+    Groups without rows are left out.
+    """
+    each = rows[list(by)].assign(score=scores.mean(axis=0), solved=np.equal(scores, task.SUCCESS).mean(axis=0))
+    return (
+        each.groupby(list(by))
+        .agg(**{"rows": ("score", "size"), "return": ("score", "mean"), "success": ("solved", "mean")})
+        .reset_index()
+    )

@@ -1,0 +1,99 @@
+"""What the success model thinks while an episode runs, and the five kinds of episodes that the paper shows (Fig. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dextron_bench.evaluation.diagnosis import Diagnosis, diagnose
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.evaluation.rollout import Agent, rollout
+from dextron_bench.experts.policies import Case, ExpertAgent
+from dextron_bench.reaches.setting import Source
+from dextron_bench.success.network import SuccessModel
+from dextron_bench.success.predict import look
+from dextron_bench.world import model as world
+
+KINDS = {
+    "fading": "hope that fades by wrong actions",
+    "early": "a closing that came too early",
+    "expert": "right for an expert",
+    "policy": "right for a policy",
+    "wrong": "the model is wrong",
+}
+EXPERT = "expert"  # Who acts where it is no policy.
+OPEN = 0.6  # A window of hope is open where the best action has this chance at least.
+RIGHT = 0.5  # A model that is right at fewer of the steps was wrong about the episode.
+SHUT = 0.2  # It is shut where even the best has this chance at most.
+
+
+@dataclass(frozen=True, slots=True)
+class Foresight:
+    """An episode as the model foretells it; `player` says who acts, "expert" or a policy's name."""
+
+    player: str
+    episode: Episode
+    diagnosis: Diagnosis
+    insight: Insight
+
+    @property
+    def times(self) -> np.ndarray:
+        """When each step (T,) is, as a share of the reach's duration."""
+        return np.arange(len(self.insight.chances)) / self.insight.duration
+
+    @property
+    def right(self) -> np.ndarray:
+        """True for the steps (T,) at which the outcome is foretold."""
+        return (self.insight.chances > 0.5) == self.episode.success
+
+    @property
+    def foretold(self) -> float:
+        """The share of steps at which the outcome is foretold."""
+        return float(self.right.mean())
+
+
+def foresee(model: SuccessModel, source: Source, case: Case, player: str, episode: Episode) -> Foresight:
+    """What the model thinks at each step of an episode of a case."""
+    return Foresight(player, episode, diagnose(episode, case), look(model, source, case, episode))
+
+
+def foreseen(
+    model: SuccessModel, source: Source, cases: Sequence[Case], policies: Mapping[str, Agent], threads: int = 0
+) -> Iterator[Foresight]:
+    """Episodes of experts and of named policies on the same cases, as the model foretells them."""
+    for player, agent in {EXPERT: ExpertAgent(), **policies}.items():
+        played = dict(rollout(agent, source, cases, threads=threads))
+        for row, case in enumerate(cases):
+            yield foresee(model, source, case, player, played[row])
+
+
+def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:
+    """The clearest episode of each of KINDS, those left out of which there is none."""
+    best: dict[str, tuple[float, Foresight]] = {}
+    for each in seen:
+        for kind, score in _scores(each).items():
+            if kind not in best or score > best[kind][0]:
+                best[kind] = score, each
+    return {kind: best[kind][1] for kind in KINDS if kind in best}
+
+
+def _scores(seen: Foresight) -> dict[str, float]:
+    """How clear an episode is as the kind that it is, if it is any."""
+    own, curves, chances = seen.player != EXPERT, seen.insight.curves, seen.insight.chances
+    if own and not seen.episode.success:  # What experts do wrong explains no policy.
+        if seen.diagnosis.cause == "too early":
+            return {"early": _fall(chances)}
+        if (curves.max(axis=1) >= OPEN).any() and curves[-1].max() <= SHUT:
+            return {"fading": seen.foretold * float((curves.max(axis=1) - chances).mean())}
+    if seen.foretold < RIGHT:
+        return {"wrong": 1.0 - seen.foretold}
+    return {"policy" if own else "expert": seen.foretold} if seen.episode.success else {}
+
+
+def _fall(chances: np.ndarray) -> float:
+    """The largest drop of chances (T,) within a quarter of a second."""
+    lag = min(int(0.25 / world.CONTROL_STEP), len(chances) - 1)
+    return float((chances[:-lag] - chances[lag:]).max()) if lag else 0.0
