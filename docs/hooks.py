@@ -40,7 +40,12 @@ def on_pre_build(config: MkDocsConfig) -> None:
         if f"{PACKAGE}.{name}" not in shown and name != "__version__":
             log.warning("no page of the reference shows %s.%s", PACKAGE, name)
     for name in shown:
-        for path in undocumented(package[name.removeprefix(f"{PACKAGE}.")]):
+        try:
+            missing = list(undocumented(package[name.removeprefix(f"{PACKAGE}.")]))
+        except (KeyError, griffe.AliasResolutionError):
+            log.warning("the reference shows %s, which does not exist", name)
+            continue
+        for path in missing:
             log.warning("%s has no docstring", path)
 
 
