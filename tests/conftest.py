@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import browsing
-import forging
 import pytest
 
 from dextron_bench.cli import main as cli
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
+from tests.helpers import forged_bundles
+from tests.helpers.browser import open_browser
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes would otherwise take every core.
 
@@ -114,17 +114,17 @@ def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
 @pytest.fixture(scope="module")
 def submitted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder with a sound bundle, near.zip, the agent near.py and the runs that it was made from."""
-    yield from forging.submitted(tmp_path_factory.mktemp("submission"))
+    yield from forged_bundles.submitted(tmp_path_factory.mktemp("submission"))
 
 
 @pytest.fixture
-def forged(submitted: Path, tmp_path: Path) -> forging.Forgery:
+def forged(submitted: Path, tmp_path: Path) -> forged_bundles.Forgery:
     """The sound bundle, taken apart."""
-    return forging.taken_apart(submitted / "near.zip", tmp_path)
+    return forged_bundles.taken_apart(submitted / "near.zip", tmp_path)
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """A headless browser; skips where there is none."""
-    with browsing.browser() as opened:
+    with open_browser() as opened:
         yield opened

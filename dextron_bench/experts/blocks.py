@@ -32,7 +32,7 @@ class Tally:
 def claim(search: dict[str, Any], folder: Path) -> None:
     """Makes the folder this search's, or checks that it is."""
     config = {"search": search, "physics": model.mjcf_hash()}
-    folder_config.write_or_check(folder / SEARCH, config, "a search", "choose another folder, or remove it")
+    folder_config.write_or_check(folder / SEARCH, config, "search", "choose another folder, or remove it")
 
 
 def claimed(folder: Path) -> dict[str, Any]:

@@ -147,7 +147,7 @@ def _checked(spec: str, found: Any) -> type[Entrant]:
     if not isinstance(found, type) or not offers or not hasattr(found, "name"):
         raise UnknownMethod(
             f"{spec!r} is not a method: it needs to be a class with `name` and `agent(seed)`, "
-            "or what dextron_bench/learning.py asks of one that trains"
+            "or what dextron_bench/methods/learners.py asks of one that trains"
         )
     if not isinstance(found.name, str) or not NAME.fullmatch(found.name):
         raise UnknownMethod(f"{spec!r} has the name {found.name!r}: use letters, digits and . _ + -, as in 'my-method'")

@@ -26,7 +26,7 @@ PROVENANCE = "provenance.json"
 EPISODES = "episodes.parquet"
 RESULT = "result.json"
 MAKER = ("method", "code", "settings")  # Of a run's config, what a result repeats: by it the agent is made again.
-HELD = "a run", "remove it, or choose another folder with --runs"
+HELD = "run", "remove it, or choose another folder with --runs"
 MANIFEST = "recordings.json"  # The SHA-256 of every recording.
 
 

@@ -17,14 +17,14 @@ class FolderMismatch(ValueError):
 def check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
     """Raises FolderMismatch if `file` holds another config than this one, DamagedFile if it cannot be read.
 
-    A file that does not exist raises nothing. The message says that the folder holds other `content`, such as
-    "a run", names the entries that differ, and ends with `advice`.
+    A file that does not exist raises nothing. The message says that the folder holds another `content`, such as
+    "run", names the entries that differ, and ends with `advice`.
     """
     if not file.exists():
         return
     stored, expected = atomic.read_json(file), json.loads(json.dumps(config))
     if names := list(_differences(stored, expected)):
-        raise FolderMismatch(f"{file.parent} holds {content} with other {' and '.join(names)}; {advice}")
+        raise FolderMismatch(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")
 
 
 def write_or_check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:

@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from measure import Row, alone, in_turns, note, scaled
 from mujoco.batch import Batch
 from pytest_benchmark.fixture import BenchmarkFixture
-from workload import Prepared, cases, reaches
 
 from dextron_bench.evaluation import episodes, rollout
 from dextron_bench.experts import policies as experts
@@ -18,6 +16,8 @@ from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.reach import Path
 from dextron_bench.world import model
 from dextron_bench.world.engine import Engine, Step
+from tests.benchmarks.measure import Row, alone, in_turns, note, scaled
+from tests.benchmarks.workload import Prepared, cases, reaches
 
 EPISODES, SLOTS, ROUNDS = 192, 96, 3
 INPUTS = ("ctrl", "mocap_pos", "mocap_quat")

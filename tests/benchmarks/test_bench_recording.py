@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from measure import Row, alone, in_turns, note, scaled
 from pytest_benchmark.fixture import BenchmarkFixture
 from rerun.chunk import RrdReader
-from workload import Prepared, cases
 
 from dextron_bench import recording
 from dextron_bench.evaluation import episodes, rollout
@@ -19,6 +17,8 @@ from dextron_bench.runs import run_files as records
 from dextron_bench.splits.loading import Split
 from dextron_bench.success import predict as insight
 from dextron_bench.success.network import SIZES, SuccessModel
+from tests.benchmarks.measure import Row, alone, in_turns, note, scaled
+from tests.benchmarks.workload import Prepared, cases
 
 ROUNDS, EPISODES, FILES = 3, 32, 200
 

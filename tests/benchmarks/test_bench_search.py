@@ -9,9 +9,7 @@ from pathlib import Path as File
 import numpy as np
 import pandas as pd
 import pytest
-from measure import Row, alone, in_turns, note, scaled
 from pytest_benchmark.fixture import BenchmarkFixture
-from workload import reaches
 
 from dextron_bench.experts import blocks, montecarlo
 from dextron_bench.experts import branching as opening
@@ -21,6 +19,8 @@ from dextron_bench.reaches.recorded import cache as archive
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.world.engine import Engine
+from tests.benchmarks.measure import Row, alone, in_turns, note, scaled
+from tests.benchmarks.workload import reaches
 
 SETTINGS, ROUNDS = 128, 2
 PAPER = 1 / 90  # Rows above 1 for each second of one thread of the paper's cluster.

@@ -10,15 +10,15 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-from measure import Row, alone, clocked, in_turns, note, scaled
 from pytest_benchmark.fixture import BenchmarkFixture
 from safetensors.numpy import save_file
-from workload import cases, reaches
 
 from baselines.cycle import FRAMES, Cycle
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import Schedule
 from dextron_bench.methods.learners import Track
+from tests.benchmarks.measure import Row, alone, clocked, in_turns, note, scaled
+from tests.benchmarks.workload import cases, reaches
 
 ROUNDS = 5
 FILLED = 1000  # Transitions in the peer's buffer.

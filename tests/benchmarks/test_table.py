@@ -1,6 +1,6 @@
 """The table says what was measured, with ratios done by hand."""
 
-from table import line, number
+from tests.benchmarks.table import line, number
 
 ROW = {"what": "Steps", "unit": "steps/s", "rate": 950.0, "against": "bare", "against_rate": 1000.0, "aim": 0.95}
 

@@ -90,7 +90,7 @@ def _company(how: Launch, episodes: Sequence[Episode], limits: Limits) -> Check:
     worst = float(np.abs(found - actions[:, order]).max())
     if worst == 0.0:
         return Check(what, OK, "half of the episodes, in another order, get the same actions to the last bit")
-    told = f"among others they differ by up to {worst:.2g}, which may end episodes otherwise; see dextron_bench.exact"
+    told = f"among others they differ by up to {worst:.2g}, which may change outcomes; see dextron_bench.Perceptron"
     return Check(what, NOTE, told)
 
 

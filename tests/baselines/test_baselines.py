@@ -1,0 +1,82 @@
+"""A contract that every installed method keeps, and what EXP and the floors do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import cast
+
+import numpy as np
+import pytest
+
+from baselines.exp import Exp
+from baselines.floors import Nothing, Random
+from baselines.omega import OmegaAgent
+from baselines.reflex import BadDistance, Reflex
+from dextron_bench.evaluation.rollout import Agent, Privileged
+from dextron_bench.experts.policies import Expert
+from dextron_bench.world import model, task
+from tests.helpers import fixed_success_model
+
+KINDS: dict[str, Callable[[], Agent]] = {  # The agents of methods that need no training.
+    "exp": lambda: Exp().agent(0),
+    "nothing": lambda: Nothing().agent(0),
+    "omega": lambda: OmegaAgent(fixed_success_model.model(0.4), 0.02, 0.08),
+    "reflex": lambda: Reflex().agent(0),
+    "random": lambda: Random().agent(0),
+}
+
+
+def states(n: int) -> np.ndarray:
+    """Made-up states (n, 48) of hands half closed, between 0.1 and 0.4 m from the bottle."""
+    rows = np.zeros((n, model.STATE))
+    rows[:, :25] = model.half_closed()
+    rows[:, 7] = np.linspace(-0.1, -0.4, n)
+    return rows
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_agent_keeps_the_contract(name: str):
+    agent = KINDS[name]()
+    shown = states(5)
+    before = shown.copy()
+    if name == "exp":
+        cast(Privileged, agent).assign(np.arange(5), [Expert(1.2, 0.5)] * 5)
+    agent.reset(np.arange(5))
+    for _ in range(3):
+        actions = agent.act(shown)
+        assert actions.shape == (5, 1)
+        assert actions.dtype == np.float64
+        assert (np.abs(actions) <= 1.0).all()
+    np.testing.assert_array_equal(shown, before)
+
+
+def test_only_exp_is_told_the_experts():
+    assert [name for name, make in KINDS.items() if isinstance(make(), Privileged)] == ["exp"]
+
+
+def test_exp_follows_each_rows_expert():
+    agent, row = Exp().agent(0), np.arange(2)
+    agent.assign(row, [Expert(1.0, 0.01), Expert(1.5, 0.9)])
+    agent.reset(row)
+    shown = states(2)
+    shown[1] = shown[0]
+    np.testing.assert_array_equal(agent.act(shown), [[0.0], [0.0]])
+    # Half closed, still at the first distance: both open, by K (0 - 0.5).
+    np.testing.assert_allclose(agent.act(shown), [[-0.5], [-0.75]])
+
+
+def test_a_floor_sends_nothing_and_the_other_uniform_noise():
+    assert not Nothing().agent(0).act(states(3)).any()
+    noise = Random().agent(0).act(states(4000))
+    assert abs(noise.mean()) < 0.04  # 4 sigma of the mean is 0.037.
+    assert noise.min() < -0.99
+    assert noise.max() > 0.99
+
+
+def test_reflex_closes_within_its_distance_and_opens_beyond():
+    shown = states(1)
+    far = float(task.distance(shown)[0])
+    assert Reflex(near=far).agent(0).act(shown)[0, 0] == 1.0
+    assert Reflex(near=0.99 * far).agent(0).act(shown)[0, 0] == -1.0
+    with pytest.raises(BadDistance, match="0 or more"):
+        Reflex(near=float("nan"))

@@ -1,0 +1,138 @@
+"""A contract that the trainers of all baselines keep: exact resuming, seeds of their own, weights that act."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from baselines import cycle
+from baselines.bc import Cloning, imitation_loss
+from baselines.cycle import Cycle
+from baselines.demonstrations import of
+from baselines.policy import MeanAgent
+from baselines.schedule import Schedule
+from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.methods.learners import Track, Trainer
+from tests.helpers.short_reaches import SETTINGS, SOURCE
+
+CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
+SCHEDULE = Schedule(epochs=4, warm_start=60, period=1)
+KINDS = ("rl", "rlil", "bc")
+
+
+@pytest.fixture(autouse=True)
+def brief_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Epochs of 80 frames, or 5 updates of cloning."""
+    monkeypatch.setattr(cycle, "FRAMES", 80)
+    monkeypatch.setattr("baselines.bc.STEPS", 5)
+
+
+def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: Schedule = SCHEDULE) -> Trainer:
+    track = Track(SOURCE, CASES, folder, threads=1)
+    if kind == "bc":
+        return Cloning(of(track), seeds)
+    return Cycle(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_restored_trainer_goes_on_bit_for_bit(kind: str, tmp_path: Path):
+    first, journals = trainer(kind, tmp_path), []
+    for _ in range(2):
+        first.advance()
+        journals.append(first.journal())
+    second = trainer(kind, tmp_path)
+    second.restore(first.state(), journals)
+    assert second.epoch == 2
+    for _ in range(2):
+        assert first.advance() == second.advance()
+    one, other = ({**each.state(), **each.journal()} for each in (first, second))
+    assert one.keys() == other.keys()
+    for name, array in one.items():
+        np.testing.assert_array_equal(array, other[name], err_msg=name)
+
+
+@pytest.mark.parametrize("kind", ["rl", "rlil"])
+def test_a_shorter_training_is_the_first_part_of_a_longer_one(kind: str, tmp_path: Path):
+    short, long = (trainer(kind, tmp_path, schedule=Schedule(epochs, 60, 1)) for epochs in (2, 7))
+    for _ in range(2):
+        assert short.advance() == long.advance()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_learning_does_not_depend_on_the_number_of_threads(kind: str, tmp_path: Path):
+    before, notes = torch.get_num_threads(), []
+    try:
+        for threads in (1, 3):
+            torch.set_num_threads(threads)
+            made = trainer(kind, tmp_path)
+            notes.append([made.advance() for _ in range(2)])
+    finally:
+        torch.set_num_threads(before)
+    assert notes[0] == notes[1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_equal_seeds_learn_equally_and_others_do_not(kind: str, tmp_path: Path):
+    first, second = trainer(kind, tmp_path), trainer(kind, tmp_path)
+    notes = [first.advance() for _ in range(2)]
+    assert notes == [second.advance() for _ in range(2)]
+    one, other = first.weights()
+    assert any((one[name] != other[name]).any() for name in one)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_seed_learns_beside_others_what_it_learns_alone(kind: str, tmp_path: Path):
+    """Up to the order in which a product is summed, which physics and Adam's steps blow up: see the losses.
+
+    `test_sac.py` compares the weights, where there is no physics.
+    """
+    schedule = Schedule(epochs=4, warm_start=150, period=1)
+    together, alone = trainer(kind, tmp_path, (0, 1), schedule), trainer(kind, tmp_path, (1,), schedule)
+    _ = together.advance(), alone.advance()
+    (other, found), (wanted,) = together.advance(), alone.advance()
+    assert found == pytest.approx(wanted, rel=1e-2)
+    assert other != pytest.approx(wanted, rel=1e-2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_weights_act(kind: str, tmp_path: Path):
+    made = trainer(kind, tmp_path)
+    made.advance()
+    for weights in made.weights():
+        actions = MeanAgent(weights).act(np.random.default_rng(0).normal(size=(3, 48)))
+        assert actions.shape == (3, 1)
+        assert (np.abs(actions) <= 1.0).all()
+
+
+def test_updates_begin_after_the_warm_start(tmp_path: Path):
+    made = trainer("rl", tmp_path)
+    (first, _), (second, _) = made.advance(), made.advance()
+    assert first["frames"] == 80
+    assert second["frames"] == 160
+    assert "value_loss" in first
+    assert "value_loss" in second
+    late = Cycle(Track(SOURCE, CASES, tmp_path, threads=1), [0], Schedule(2, 100, 1), 0)
+    before = late.weights()[0]["policy.4"]
+    assert "value_loss" not in late.advance()[0]
+    np.testing.assert_array_equal(late.weights()[0]["policy.4"], before)
+
+
+def test_the_imitation_loss_by_hand():
+    found = imitation_loss(torch.tensor([[[0.0], [100.0]]]), torch.tensor([[[0.5], [-1.0]]]))
+    torch.testing.assert_close(found, torch.tensor([(0.25 + 4.0) / 2]))
+
+
+@pytest.mark.slow
+def test_behaviour_cloning_recovers_an_expert(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Demonstrations of one expert on five settings: a thousand updates bring actions within 0.1 of its own."""
+    monkeypatch.setattr("baselines.bc.STEPS", 250)
+    demos = of(Track(SOURCE, CASES, tmp_path, threads=1))
+    cloning = Cloning(demos, [0])
+    for _ in range(4):
+        cloning.advance()
+    rows = demos.transitions()
+    actions = MeanAgent(cloning.weights()[0]).act(demos.states[rows].astype(np.float64))
+    assert np.sqrt(np.mean((actions[:, 0] - demos.actions[rows]) ** 2)) < 0.1

@@ -1,0 +1,195 @@
+"""`dextron-bench data` as a user meets it: results on stdout, one line on stderr, exit codes."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dextron_bench.cli import main as cli
+from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded import release
+from tests.conftest import Published
+
+FILE, NOTES = "extracts/01_fl_06.json", "extracts/meta/01_fl_06_meta.json"
+INJECT = """
+import sys
+from pathlib import Path
+from dextron_bench.reaches.recorded import release
+release.SHIPPED = Path(sys.argv.pop(1))
+from dextron_bench.cli.main import main
+sys.exit(main())
+"""  # The command line, checking against another manifest than the shipped one.
+
+
+def run(published: Published, *words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs the command line in a process of its own, with an empty cache unless told otherwise."""
+    inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
+    cache = {"DEXTRON_CACHE": str(published.folder / "cache")}
+    command = [sys.executable, "-c", INJECT, str(published.manifest), *map(str, words)]
+    return subprocess.run(
+        command, env={**inherited, **cache, **environment}, capture_output=True, text=True, timeout=120
+    )
+
+
+def complaint(done: subprocess.CompletedProcess[str]) -> str:
+    """The one line on stderr of a command that ended with code 2 and no result."""
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("dextron-bench: ")
+    return done.stderr
+
+
+def with_line(content: bytes, number: int, line: bytes) -> bytes:
+    lines = content.splitlines(keepends=True)
+    lines[number - 1] = line
+    return b"".join(lines)
+
+
+def test_import_then_info(published: Published):
+    done = run(published, "data", "import", "--from", published.zip())
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("3 reaches imported into ")
+    done = run(published, "data", "info", "--json")
+    groups = json.loads(done.stdout)
+    assert [(g["subject"], g["ring"], g["angle"], g["reaches"]) for g in groups] == [
+        *(("01", 0, 0, 1), ("01", 1, 1, 1), ("02", 3, 3, 1))
+    ]
+    assert groups[0]["duration"] == pytest.approx(0.5)  # Six samples, 0.1 s and 0.1 m apart.
+    assert groups[0]["length"] == pytest.approx(0.5)
+    assert groups[0]["speed"] == pytest.approx(1.0)
+
+
+DAMAGE = {
+    "truncated": (FILE, lambda content: content[:-30], f"{FILE}: line 6: is not JSON"),
+    "invalid": (FILE, lambda content: with_line(content, 3, b"oops\n"), f"{FILE}: line 3: is not JSON"),
+    "back": (FILE, lambda c: with_line(c, 4, c.splitlines(True)[1]), f"{FILE}: line 4: time goes back"),
+    "nan": (FILE, lambda content: content.replace(b"-0.2", b"NaN", 1), f"{FILE}: line 1: 'x' holds nan"),
+    "short": (FILE, lambda content: content.replace(b", -0.1]", b"]", 1), f"{FILE}: line 1: 'x' is not 3 numbers"),
+    "annotation": (NOTES, lambda content: content.replace(b"reached", b"touched"), f"{NOTES}: line 1: annotation 'rea"),
+    "blank": (FILE, lambda content: content + b"\n", f"{FILE}: line 7: is not JSON"),
+    "value": (FILE, lambda content: content.replace(b"-0.5", b"-0.6"), f"{FILE}: its SHA-256 is not the published"),
+}
+
+
+QUICK = ("truncated", "value")  # The rest wait for `make check`: each starts a process.
+
+
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=[] if k in QUICK else pytest.mark.slow) for k in DAMAGE])
+def test_damage_is_one_line_with_file_and_place(published: Published, kind: str):
+    file, damage, expected = DAMAGE[kind]
+    where = published.zip({file: damage(published.files[file])})
+    assert expected in complaint(run(published, "data", "import", "--from", where))
+    assert not (published.folder / "cache").exists()
+
+
+def test_info_without_reaches_says_how_to_get_them(published: Published):
+    line = complaint(run(published, "data", "info"))
+    assert "data import --from" in line
+    assert "data fetch" in line
+
+
+def test_info_reads_what_the_environment_names(published: Published):
+    done = run(published, "data", "info", DEXTRON_DATA=str(published.zip()))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "3 real reaches by subject" in done.stdout
+
+
+def test_fetch_without_network_names_the_other_way(published: Published):
+    line = complaint(run(published, "data", "fetch", https_proxy="http://127.0.0.1:9", no_proxy=""))
+    assert "cannot download https://github.com/" in line
+    assert "data import --from" in line
+
+
+def test_a_cache_that_cannot_be_made_is_one_line(published: Published):
+    blocked = str(published.manifest / "cache")
+    line = complaint(run(published, "data", "import", "--from", published.zip(), DEXTRON_CACHE=blocked))
+    assert "Not a directory" in line
+    assert blocked in line
+
+
+def test_debug_shows_where(monkeypatch: pytest.MonkeyPatch):
+    with pytest.raises(FileNotFoundError):
+        cli.main(["data", "import", "--debug", "--from", "/none"])
+    monkeypatch.setenv("DEXTRON_DEBUG", "1")
+    with pytest.raises(FileNotFoundError):
+        cli.main(["data", "import", "--from", "/none"])
+
+
+@pytest.mark.parametrize(
+    "words", [["nosuch"], ["data", "nosuch"], ["data", "info", "--nosuch"], ["data", "import"], []]
+)
+def test_wrong_usage_is_code_2(words: list[str], capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(words)
+    assert caught.value.code == 2
+    assert capsys.readouterr().out == ""
+
+
+def test_every_verb_has_an_example(capsys: pytest.CaptureFixture[str]):
+    for name, verb in cli.VERBS.items():
+        for inner in [[part] for part in verb[1]] if isinstance(verb, tuple) else [[]]:
+            with pytest.raises(SystemExit) as caught:
+                cli.main([name, *inner, "--help"])
+            assert caught.value.code == 0
+            assert f"Example: dextron-bench {' '.join([name, *inner])}" in capsys.readouterr().out
+
+
+def test_help_imports_nothing_heavy():
+    script = "import sys; from dextron_bench import cli; cli._union(cli.VERBS); print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"torch", "mujoco", "scipy", "pandas", "matplotlib", "rerun", "pyarrow"} & set(loaded)
+
+
+def test_a_reader_that_stops_early_is_no_error(published: Published):
+    run(published, "data", "import", "--from", published.zip())
+    command = [sys.executable, "-c", INJECT, str(published.manifest), "data", "info"]
+    environment = {**os.environ, "DEXTRON_CACHE": str(published.folder / "cache")}
+    pipe = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert pipe.stdout is not None
+    pipe.stdout.close()
+    assert pipe.stderr is not None
+    assert pipe.stderr.read() == b""
+    assert pipe.wait() == 0
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (OSError(errno.ENOSPC, "No space left on device", "runs/a"), 2, "No space left on device: runs/a"),
+        (archive.MissingData(), 2, "the recorded reaches have not been imported"),
+        (ModuleNotFoundError("No module named 'ray'"), 2, "No module named 'ray'"),
+        (TypeError("two\nlines"), 70, "unexpected TypeError: two lines"),
+    ],
+)
+def test_every_end_has_its_code(
+    error: BaseException,
+    code: int,
+    line: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.delenv("DEXTRON_DEBUG", raising=False)
+    monkeypatch.setattr(archive, "import_release", fail)
+    assert cli.main(["data", "import", "--from", "x"]) == code
+    assert capsys.readouterr().err.startswith(f"dextron-bench: {line}")
+
+
+def test_picture_of_a_source(published: Published, tmp_path: Path):
+    from dextron_bench.reaches.setting import ReachSource
+    from dextron_bench.scores.figures import UnknownFormat, reach_paths
+
+    reaches = release.read(published.zip(), release.Manifest.load(published.manifest))
+    reach_paths(ReachSource("real", reaches), tmp_path / "reaches.png")
+    assert (tmp_path / "reaches.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(UnknownFormat, match=r"choose from \.pdf, \.png, \.svg"):
+        reach_paths(ReachSource("real", reaches), tmp_path / "reaches.doc")

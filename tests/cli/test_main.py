@@ -1,0 +1,303 @@
+"""The command line from end to end: whatever goes wrong is one line and a code, and results are for programs."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dextron_bench.cli import main as cli
+from dextron_bench.runs.run_files import read_result
+from dextron_bench.storage import atomic
+from tests.helpers import tiny_benchmark
+
+AGENT = """
+import numpy as np
+
+class Mine:
+    name = "mine"
+    def agent(self, seed): return self
+    def reset(self, episodes): ...
+    def act(self, states):
+        actions = np.zeros((len(states), 1))
+        {spoil}
+        return actions
+"""
+HEAVY = {"mujoco", "torch", "pandas", "gymnasium", "scipy", "matplotlib", "rerun", "pyarrow", "dm_control", "numpy"}
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty working folder, with tiny splits of short reaches as the shipped ones."""
+    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DEXTRON_DATA", raising=False)
+    monkeypatch.delenv("DEXTRON_DEBUG", raising=False)
+    monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
+    yield tmp_path
+    tiny_benchmark.forget()
+
+
+def mine(folder: Path, spoil: str) -> str:
+    """A method whose agent sends zeros, spoiled by a statement."""
+    (folder / "mine.py").write_text(AGENT.format(spoil=spoil))
+    return "mine.py:Mine"
+
+
+def run(method: str, *words: str) -> list[str]:
+    return ["run", "--method", method, "--split", "test", "--no-floors", "--quiet", "--record", "0", *words]
+
+
+def test_results_are_json_and_nothing_else(here: Path, capsys: pytest.CaptureFixture[str]):
+    assert cli.main([*run("exp", "--json"), "--record", "1"]) == 0
+    printed = capsys.readouterr()
+    (row,) = json.loads(printed.out)
+    assert (row["method"], row["reaches"], row["split"], row["episodes"]) == ("exp", "synthetic", "test", 2)
+    assert (row["return"], row["success"], row["failed"]) == (20.0, 1.0, 0)
+    assert printed.err == ""
+    assert cli.main(["leaderboard", "show", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == [row]
+
+
+def test_a_run_says_where_its_files_are(here: Path, capsys: pytest.CaptureFixture[str]):
+    assert cli.main(["run", "--method", "nothing", "--split", "open", "--quiet"]) == 0
+    printed = capsys.readouterr().out
+    assert "runs/nothing/synthetic/seed0" in printed
+    assert "random" in printed  # The other floor.
+    assert cli.main(["list"]) == 0
+    printed = capsys.readouterr().out
+    assert "Replays the expert" in printed
+    assert "unseen-reach" in printed
+
+
+def test_an_agent_that_fails_now_and_then_is_code_3_and_the_rest_is_scored(
+    here: Path, capsys: pytest.CaptureFixture[str]
+):
+    for spoil, failure in (("actions[0] = np.nan", "action is nan"), ("actions[0] = 1.001", "is outside [-1, 1]")):
+        assert cli.main(run(mine(here, spoil), "--json", "--runs", failure[:9])) == 3
+        (row,) = json.loads(capsys.readouterr().out)
+        assert (row["episodes"], row["failed"]) == (2, 1)
+        episodes = pd.read_parquet(here / failure[:9] / "mine" / "synthetic" / "seed0" / "episodes.parquet")
+        assert failure in episodes["failure"][0]
+        assert (episodes["failure"][1], episodes["length"][0]) == ("", 0)
+        assert episodes["length"][1] > 30
+        for name in [name for name in sys.modules if name.startswith("dextron_entrant_")]:
+            del sys.modules[name]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        ("actions = actions[:, 0]", "act() must return floats of shape (2, 1)"),
+        ("actions = None", "act() must return floats"),
+        ("raise ZeroDivisionError('oh')", "the agent's act() raised ZeroDivisionError: oh"),
+        ("raise OSError(2, 'No weights')", "raised FileNotFoundError: [Errno 2] No weights"),
+    ],
+)
+def test_an_agent_that_cannot_play_is_one_line(here: Path, complaint: Callable[..., str], spoil: str, expected: str):
+    assert expected in complaint(*run(mine(here, spoil)))
+    assert not list(here.rglob("result.json"))
+
+
+def test_an_agent_that_cannot_begin_is_one_line(here: Path, complaint: Callable[..., str]):
+    assert "agent(-1) of method 'random' raised ValueError" in complaint(*run("random", "--seed", "-1"))
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (run("nosuch"), "no method 'nosuch'; choose from"),
+        (run("mine.py:Mine"), "there is no file mine.py"),
+        (["run", "--split", "tset"], "no split 'tset' of 'synthetic' reaches; choose from val, test"),
+        (["run", "--reaches", "real"], "no split 'test' of 'real' reaches; none ships"),
+        (["data", "info", "--reaches", "real"], "data import --from"),
+        (["mc", "--share", "2/2", "--reaches", "synthetic"], "share 2/2 does not exist"),
+        (["mc", "--seed", "-1"], "a seed of 0 or more"),
+        (["view"], "there is no runs"),
+        (["view", "nowhere"], "there is no nowhere"),
+        (["splits", "--reaches", "synthetic", "--database", "no.parquet", "--into", "new"], "no.json"),
+    ],
+)
+def test_what_is_not_there_is_one_line(here: Path, complaint: Callable[..., str], words: list[str], expected: str):
+    assert expected in complaint(*words)
+    assert sorted(os.listdir(here)) == ["data"]
+
+
+@pytest.mark.parametrize(
+    "words", [["nosuch"], ["run", "--reaches", "nosuch"], ["run", "--seed", "x"], ["view", "--row", "x"]]
+)
+def test_wrong_words_are_code_2(words: list[str], capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(words)
+    assert caught.value.code == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "--help" in printed.err or words[-1] in printed.err
+
+
+def test_real_reaches_that_were_not_imported_are_one_line(here: Path, complaint: Callable[..., str]):
+    catalogue = here / "data" / "splits.json"
+    catalogue.write_text(catalogue.read_text().replace("synthetic", "real"))
+    (here / "data" / "splits-synthetic.parquet").rename(here / "data" / "splits-real.parquet")
+    words = ["run", "--reaches", "real", "--split", "val"]
+    assert "the recorded reaches have not been imported: run `dextron-bench data import" in complaint(*words)
+    assert not (here / "runs").exists()
+
+
+def test_a_file_where_the_folder_should_be_is_one_line(here: Path, complaint: Callable[..., str]):
+    (here / "runs").write_text("")
+    assert "runs" in complaint(*run("nothing"))
+    assert (here / "runs").read_text() == ""
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing_half(
+    here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]
+):
+    write_whole = atomic.write_atomically
+
+    def full(file: Path, write: Callable[[Path], object]) -> None:
+        def fill(part: Path) -> None:
+            write(part)
+            part.write_bytes(part.read_bytes()[:50])
+            raise OSError(28, "No space left on device", str(file))
+
+        write_whole(file, fill if file.name == "episodes.parquet" else write)
+
+    monkeypatch.setattr(atomic, "write_atomically", full)
+    line = complaint(*run("nothing"))
+    assert "No space left on device: runs/nothing/synthetic/seed0/episodes.parquet" in line
+    assert sorted(os.listdir("runs/nothing/synthetic/seed0")) == ["config.json", "provenance.json"]
+
+
+@pytest.mark.parametrize("name", ["episodes.parquet", "result.json", "config.json"])
+def test_a_damaged_run_is_one_line_that_names_the_file(
+    here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str], name: str
+):
+    words = ["run", "--method", "nothing", "--split", "open", "--no-floors", "--quiet"]
+    assert cli.main(words) == 0
+    file = here / "runs" / "nothing" / "synthetic" / "seed0" / name
+    file.write_bytes(file.read_bytes()[:20])
+    line = complaint(*(["leaderboard", "show"] if name == "result.json" else words))
+    assert f"runs/nothing/synthetic/seed0/{name} is damaged" in line
+    assert "remove it and run again" in line
+    file.unlink()
+    if name != "config.json":
+        assert cli.main(words) == 0  # As the line said.
+
+
+def test_a_damaged_split_is_one_line(here: Path, complaint: Callable[..., str]):
+    file = here / "data" / "splits-synthetic.parquet"
+    file.write_bytes(file.read_bytes()[:100])
+    assert "reinstall the package" in complaint(*run("nothing"))
+    assert "reinstall the package" in complaint("list")
+
+
+def test_a_leaderboard_without_results_says_how_to_make_some(here: Path, capsys: pytest.CaptureFixture[str]):
+    assert cli.main(["leaderboard", "show"]) == 0
+    assert "dextron-bench run" in capsys.readouterr().out
+    assert cli.main(["leaderboard", "show", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == []
+
+
+def test_a_search_prints_json(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    from dextron_bench.experts import montecarlo
+
+    draws = pd.DataFrame(
+        [("a", 0.0, 0.0, 0.0, 1.0, 0.5, 20.0, 90)], columns=[*tiny_benchmark.COLUMNS[1:7], "score", "length"]
+    )
+    monkeypatch.setattr(montecarlo, "run", lambda *_, **__: draws)
+    assert cli.main(["mc", "--json", "--quiet"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["kept"], found["solved"]) == (1, 1)
+
+
+def test_the_commands_own_process_has_the_codes(here: Path):
+    """What the tests above see of `main` is what a shell sees."""
+    process = tiny_benchmark.start(here / "data", *run("nosuch"))
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("dextron-bench: no method 'nosuch'; choose from ")
+
+
+def test_interrupted_a_run_is_code_130_and_goes_on_later(here: Path, capsys: pytest.CaptureFixture[str]):
+    spoil = "import time; open('started', 'w').close(); time.sleep(0.05)"
+    words = run(mine(here, spoil))
+    process = tiny_benchmark.start(here / "data", *words)
+    waited = time.monotonic()
+    while not (here / "started").exists() and time.monotonic() - waited < 120 and process.poll() is None:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=120)
+    assert (process.returncode, err) == (130, "dextron-bench: interrupted\n")
+    left = here / "runs" / "mine" / "synthetic" / "seed0"
+    assert sorted(os.listdir(left)) == ["config.json", "provenance.json"]
+    assert cli.main(words) == 0
+    assert len(read_result(left / "result.json")["splits"]["test"]["scores"]) == 2
+
+
+def test_help_and_the_package_itself_import_nothing_heavy():
+    script = "import sys\ntry:\n from dextron_bench.cli.main import main; main(['--help'])\nexcept SystemExit: pass\n"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{script}print('LOADED', *sys.modules)"], capture_output=True, text=True, check=True
+    )
+    help_text, _, loaded = done.stdout.partition("LOADED")
+    assert "Exit codes" in help_text
+    assert {"dextron_bench.cli.run"} <= set(loaded.split())
+    assert not HEAVY & set(loaded.split())
+
+
+def test_products_of_numpy_take_one_thread_unless_it_is_said_otherwise():
+    script = (
+        "from dextron_bench.cli.main import main; main(['--version']); import numpy, threadpoolctl; "
+        "print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
+    )
+    inherited = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    for more, threads in (({}, "{1}"), ({"OPENBLAS_NUM_THREADS": "2"}, "{2}")):
+        done = subprocess.run(
+            [sys.executable, "-c", script], env=inherited | more, capture_output=True, text=True, check=True
+        )
+        assert done.stdout.endswith(f"{threads}\n")
+
+
+@pytest.mark.parametrize("order", ["dextron_bench, gymnasium", "gymnasium, dextron_bench"])
+def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
+    find = "import importlib.util; importlib.util.find_spec('gymnasium')"  # Looking is not importing.
+    script = f"import {order.split(',')[0]}; {find}; import {order}; print(gymnasium.spec('dextron_bench/Grasp-v0').id)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("dextron_bench/Grasp-v0\n", "")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["doctor"],
+        ["list"],
+        ["leaderboard", "show"],
+        ["leaderboard", "build"],
+        ["view"],
+        ["recordings", "list"],
+        ["recordings", "export"],
+        ["splits"],
+        ["mc"],
+        ["run"],
+        ["eval"],
+        ["compare"],
+        ["success", "data"],
+        ["success", "train"],
+        ["success", "eval"],
+        ["success", "explain"],
+    ],
+)
+def test_help_of_a_verb_has_an_example(words: list[str], capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as caught:
+        cli.main([*words, "--help"])
+    assert caught.value.code == 0
+    assert f"Example: dextron-bench {words[0]}" in capsys.readouterr().out

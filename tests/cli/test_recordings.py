@@ -1,0 +1,105 @@
+"""`dextron-bench recordings` from the command line: what there is, what is damaged, and other files made of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from PIL import Image
+from rerun.chunk import RrdReader
+
+from dextron_bench.cli import main as cli
+from tests.helpers import tiny_benchmark
+
+FOLDER = "runs/exp/synthetic/seed0/recordings"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A working folder in the tiny world with a run of two recorded episodes."""
+    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["run", "--split", "test", "--no-floors", "--quiet", "--json", "--record", "2"]) == 0
+    yield tmp_path
+    tiny_benchmark.forget()
+
+
+def test_recordings_are_listed_with_what_they_say(here: Path, capsys: pytest.CaptureFixture[str]):
+    capsys.readouterr()
+    assert cli.main(["recordings", "list"]) == 0
+    printed = capsys.readouterr()
+    assert [title in printed.out for title in ("file", "outcome", "kB", "success", "20.000")] == [True] * 5
+    assert [f"{FOLDER}/test-000{row}.rrd" in printed.out for row in (0, 1)] == [True] * 2  # In one piece.
+    assert printed.err == ""
+    assert cli.main(["recordings", "list", f"{FOLDER}/test-0001.rrd", "--json", "--check"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    steps = int(pd.read_parquet(Path(FOLDER).parent / "episodes.parquet")["length"][1])
+    assert row == {
+        "file": f"{FOLDER}/test-0001.rrd", "method": "exp", "reaches": "synthetic", "seed": 0, "split": "test",
+        "row": 1, "return": 20.0, "outcome": "success", "steps": steps,
+        "kB": round(Path(f"{FOLDER}/test-0001.rrd").stat().st_size / 1000), "damage": "",
+    }  # fmt: skip
+
+
+def test_damaged_recordings_are_a_line_each_and_code_1(here: Path, capsys: pytest.CaptureFixture[str]):
+    whole, cut, text = (Path(FOLDER) / name for name in ("test-0000.rrd", "test-0001.rrd", "text.rrd"))
+    cut.write_bytes(cut.read_bytes()[:-30])
+    text.write_text("reach,return\n")
+    capsys.readouterr()
+    assert cli.main(["recordings", "list"]) == 1
+    printed = capsys.readouterr()
+    assert printed.err.splitlines() == [
+        f"dextron-bench: {cut}: is cut short, or its writing was: it has no footer",
+        f"dextron-bench: {text}: is no .rrd file",
+    ]
+    assert str(whole) in printed.out
+    assert str(cut) not in printed.out
+    assert cli.main(["recordings", "list", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [bool(row["damage"]) for row in found] == [False, True, True]
+    assert [row["return"] for row in found] == [20.0, None, None]
+    assert cli.main(["recordings", "list", str(text)]) == 1
+    assert capsys.readouterr().out == ""
+
+
+def test_a_run_knows_its_files_by_their_hashes(here: Path, capsys: pytest.CaptureFixture[str]):
+    """Row ids are covered by no digest, but by the SHA-256 in the run's manifest."""
+    file = Path(FOLDER) / "test-0000.rrd"
+    content = bytearray(file.read_bytes())
+    chunk = RrdReader(file).store().stream().filter(content="/episode/rewards").to_chunks()[0]
+    row_ids = chunk.to_record_batch().column("rerun.controls.RowId")
+    content[content.index(row_ids[0].as_py())] ^= 1
+    file.write_bytes(content)
+    assert cli.main(["recordings", "list"]) == 0
+    capsys.readouterr()
+    assert cli.main(["recordings", "list", "--check"]) == 1
+    assert f"{file}: is not the file whose SHA-256 was kept" in capsys.readouterr().err
+
+
+def test_a_recording_is_exported_as_a_film_and_a_table(here: Path, capsys: pytest.CaptureFixture[str]):
+    capsys.readouterr()
+    words = ["recordings", "export", f"{FOLDER}/test-0000.rrd", "--quiet", "--into"]
+    assert cli.main([*words, "out/grasp.gif", "--width", "32", "--height", "24", "--speed", "20"]) == 0
+    assert capsys.readouterr() == ("out/grasp.gif\n", "")
+    assert Image.open("out/grasp.gif").size == (32, 24)
+    assert cli.main([*words, "grasp.csv"]) == 0
+    assert pd.read_csv("grasp.csv")["reward"].sum() == 20.0
+
+
+def test_what_cannot_be_exported_is_one_line(
+    here: Path, complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+):
+    words = ["recordings", "export", f"{FOLDER}/test-0000.rrd", "--quiet", "--into"]
+    assert "choose from .mp4, .gif, .csv, .parquet" in complaint(*words, "grasp.avi")
+    assert "no camera 'left'; choose from" in complaint(*words, "grasp.gif", "--camera", "left")
+    assert "films have an even number of pixels" in complaint(*words, "grasp.gif", "--width", "33")
+    assert "there is no such file" in complaint("recordings", "export", "none.rrd", "--into", "grasp.csv")
+    assert "no recordings at data" in complaint("recordings", "list", "data")
+    (here / "taken").write_text("")
+    assert "taken" in complaint(*words, "taken/grasp.csv")
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
+    assert "cannot draw off screen" in complaint(*words, "grasp.mp4")
+    assert not list(here.glob("*grasp*"))

@@ -1,0 +1,267 @@
+"""Methods that train, from the command line: flags, files, weights, and one line for whatever goes wrong."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from safetensors.numpy import save_file
+
+from dextron_bench.cli import main as cli
+from dextron_bench.cli.method_flags import in_a_line
+from dextron_bench.storage import hashing, tensors
+from dextron_bench.world import model
+from tests.helpers import tiny_benchmark, tiny_training, toy_learner
+from tests.helpers.tiny_training import HEIR, HOMELY, TOY
+
+SHAPE = model.STATE
+FAST = ("--quiet", "--no-floors", "--record", "0")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty working folder in the tiny world."""
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DEXTRON_DEBUG", raising=False)
+    yield tmp_path
+    tiny_benchmark.forget()
+
+
+def run(spec: str, *words: str) -> list[str]:
+    return ["run", "--method", spec, *FAST, "--split", "test", "--preset", "smoke", *words]
+
+
+def evaluate(*words: str) -> list[str]:
+    return ["eval", "--method", TOY, "--quiet", "--split", "test", *words]
+
+
+def rows(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
+    capsys.readouterr()
+    assert cli.main([*words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_run_trains_all_seeds_together_and_says_so(here: Path, capsys: pytest.CaptureFixture[str]):
+    (row,) = rows(capsys, *run(TOY, "--seed", "0", "1", "--rate", "0.3"))
+    assert (row["method"], row["seeds"], row["episodes"]) == ("toy-0.3", 2, 4)
+    base = here / "runs" / "toy-0.3" / "synthetic"
+    assert sorted(each.name for each in base.iterdir()) == ["seed0", "seed1", "training-0+1"]
+    result = json.loads((base / "seed1" / "result.json").read_text())
+    told = result["training"]
+    assert (told["seeds"], told["epochs"], told["best_epoch"], told["frames"]) == ([0, 1], 2, 2, 40)
+    assert told["sha256"] == hashing.sha256(base / "seed1" / "weights.safetensors")
+    assert [point["epoch"] for point in json.loads((base / "seed1" / "curve.json").read_text())["points"]] == [2]
+    assert cli.main(["list"]) == 0
+    assert "toy-0.3" in capsys.readouterr().out
+
+
+def test_seeds_that_are_trained_are_not_trained_again(here: Path, capsys: pytest.CaptureFixture[str]):
+    assert cli.main(run(TOY, "--seed", "1")) == 0
+    before = tiny_training.contents(here / "runs" / "toy-0.1" / "synthetic" / "seed1")
+    (row,) = rows(capsys, *run(TOY, "--seed", "0", "1", "2"))
+    assert row["seeds"] == 3
+    base = here / "runs" / "toy-0.1" / "synthetic"
+    assert sorted(each.name for each in base.glob("training-*")) == ["training-0+2", "training-1"]
+    assert tiny_training.contents(base / "seed1") == before
+
+
+def test_an_heir_acts_with_what_its_teacher_learned_at_home(here: Path, capsys: pytest.CaptureFixture[str]):
+    (row,) = rows(capsys, *run(HEIR))
+    assert (row["method"], row["reaches"]) == ("toy-heir", "synthetic")
+    teacher = here / "runs" / "homely-0.1" / "minjerk" / "seed0"
+    heir = here / "runs" / "toy-heir" / "synthetic" / "seed0"
+    assert (teacher / "weights.safetensors").read_bytes() == (heir / "weights.safetensors").read_bytes()
+    assert json.loads((heir / "result.json").read_text())["training"]["label"] == "homely-0.1"
+    found = rows(capsys, *run(HOMELY), "--floors")
+    assert {row["method"]: row["reaches"] for row in found} == dict.fromkeys(
+        ("homely-0.1", "nothing", "random"), "minjerk"
+    )
+    arrays = tensors.read(teacher / "weights.safetensors")
+    tensors.write(teacher / "weights.safetensors", arrays, {"label": "homely-0.1", "seed": 1})
+    assert cli.main(run(HEIR)) == 2
+    assert "holds a run with other weights" in capsys.readouterr().err
+
+
+def test_a_dry_run_says_what_is_left_and_writes_nothing(here: Path, capsys: pytest.CaptureFixture[str]):
+    words = [*run(TOY, "--seed", "0", "1"), "--dry-run"]
+    train, play = rows(capsys, *words)
+    assert (train["what"], train["left"], train["seeds"]) == ("train", "2 of 2 epochs", [0, 1])
+    assert 0 < train["seconds"] < 60
+    assert (play["what"], play["left"]) == ("evaluate", "4 episodes")
+    assert 0 < play["seconds"] < 60
+    assert not (here / "runs").exists()
+    assert cli.main([*run(TOY, "--breaks", "2", "--every", "1")]) == 2
+    train, _ = rows(capsys, *run(TOY, "--breaks", "2", "--every", "1"), "--dry-run")
+    assert train["left"] == "1 of 2 epochs"
+    assert cli.main(["list"]) == 0
+    assert "1 of 2 epochs" in capsys.readouterr().out
+    assert cli.main(words[:-1]) == 2  # The folder has a run with other settings.
+    assert cli.main([*run(TOY, "--runs", "other")]) == 0
+    assert rows(capsys, *run(TOY, "--runs", "other"), "--dry-run") == []
+    assert cli.main([*run(TOY, "--runs", "other"), "--dry-run"]) == 0
+
+
+def test_flags_of_a_method_are_in_the_help(here: Path, capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["run", "--method", TOY, "--help"])
+    assert caught.value.code == 0
+    printed = capsys.readouterr().out
+    assert "--rate" in printed
+    assert "Learning rate." in printed
+    assert "--seed" in printed
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--nosuch", "1"], "Unrecognized options: --nosuch"),
+        (["--rate", "x"], "Error parsing --rate: could not convert string to float: 'x'; see `dextron-bench run --h"),
+        (["--rate", "-1"], "--rate is -1; a learning rate is positive"),
+        (
+            ["--preset", "no"],
+            "invalid choice 'no' for argument '--preset'. Expected one of ('paper', 'quick', 'smoke')",
+        ),
+        (["--split", "tset"], "no split 'tset' of 'synthetic' reaches"),
+        (["--breaks", "1"], "epoch 1 of method 'toy-0.1' raised ZeroDivisionError: toys break"),
+        (["--spoils", "1"], "diverged: 'loss' of seed 0 is nan in epoch 1; there is no checkpoint yet in runs/toy-0.1"),
+        (["--every", "0"], "needs at least one epoch and a period of at least one"),
+        (["--device", "cuda"], "no CUDA device is at hand"),
+    ],
+)
+def test_what_goes_wrong_is_one_line(
+    here: Path, complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch, words: list[str], expected: str
+):
+    absent = SimpleNamespace(cuda=SimpleNamespace(is_available=lambda: False))
+    monkeypatch.setitem(sys.modules, "torch", absent)
+    assert expected in complaint(*run(TOY), *words)
+    assert not list(here.rglob("result.json"))
+
+
+FRAMED = """╭─ Value error ────────╮
+│ Error parsing --rate: │
+│ not a float: 'x'.     │
+│ ───────────────────── │
+│ Argument helptext:    │
+│     --rate FLOAT      │
+│ ───────────────────── │
+│ For full helptext, see│
+╰──────────────────────╯
+"""
+ASCII = (
+    re.sub("[╭╰╮╯]", " ", FRAMED).replace("│", " ").replace("─", "-").replace("- Value error --", "Value error\n --")
+)
+
+
+@pytest.mark.parametrize("framed", [FRAMED, ASCII])
+def test_frames_are_told_in_a_line(framed: str):
+    assert in_a_line(framed) == "Error parsing --rate: not a float: 'x'"
+
+
+ODD = """
+from dataclasses import dataclass
+@dataclass(frozen=True)
+class Odd:
+    name = "odd"
+    {field}
+    def agent(self, seed): ...
+"""
+
+
+@pytest.mark.parametrize(
+    ("field", "expected"),
+    [
+        ("seed: int = 0", "has a setting 'seed', which is a flag of 'run' itself"),
+        ("size: int", "method 'odd.py:Odd': "),
+        ("label: str = '../up'", "has the label '../up'"),
+        ("size: int = 1\n    def __post_init__(self): raise KeyError('oh')", "method 'odd.py:Odd': 'oh'"),
+    ],
+)
+def test_settings_that_cannot_be_flags_are_one_line(
+    here: Path, complaint: Callable[..., str], field: str, expected: str
+):
+    (here / "odd.py").write_text(ODD.format(field=field))
+    assert expected in complaint("run", "--method", "odd.py:Odd", *FAST)
+
+
+def test_weights_of_a_file_give_the_row_of_its_run(here: Path, capsys: pytest.CaptureFixture[str]):
+    trained = rows(capsys, *run(TOY, "--seed", "4"))
+    file = here / "runs" / "toy-0.1" / "synthetic" / "seed4" / "weights.safetensors"
+    assert rows(capsys, *evaluate("--weights", str(file))) == trained
+    assert (here / "runs" / "eval" / "toy-0.1" / "synthetic" / "seed4" / "result.json").exists()
+    assert len(rows(capsys, "leaderboard", "show")) == 1  # Evaluations of weights are not counted again.
+
+
+def test_weights_that_ship_lie_beside_the_method(
+    here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
+):
+    (here / "toy.py").write_text(Path(toy_learner.__file__).read_text())
+    words = ["eval", "--method", "toy.py:Toy", "--quiet", "--split", "test"]
+    assert (
+        "no weights of 'toy-0.2' on synthetic reaches ship for seed 0; train them with `dextron-bench run --method "
+        "toy.py:Toy --rate 0.2 --reaches synthetic --seed 0`"
+    ) in complaint(*words, "--rate", "0.2")
+    trained = rows(capsys, *run("toy.py:Toy", "--seed", "0", "2"))
+    for seed in (0, 2):
+        place = here / "weights" / "toy-0.1" / "synthetic" / f"seed{seed}.safetensors"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes((here / f"runs/toy-0.1/synthetic/seed{seed}/weights.safetensors").read_bytes())
+    assert rows(capsys, *words) == trained
+    assert "ship for seed 1; train them" in complaint(*words, "--seed", "0", "1")
+    assert "--rate 0.2 --reaches synthetic --seed 0`, or take what ships: toy-0.1" in complaint(*words, "--rate", "0.2")
+
+
+def damaged(folder: Path, kind: str) -> Path:
+    """A file of weights that is none."""
+    file, good = folder / f"{kind}.safetensors", {"map": np.zeros(SHAPE), "offset": np.zeros(())}
+    made: dict[str, Callable[[], object]] = {
+        "missing": lambda: None,
+        "empty": lambda: file.write_bytes(b""),
+        "pickle": lambda: file.write_bytes(pickle.dumps(good)),
+        "header": lambda: file.write_bytes(b"\xff" * 8 + b"{}"),
+        "nested": lambda: file.write_bytes((200000).to_bytes(8, "little") + b"[" * 200000),
+        "cut": lambda: (save_file(good, file), file.write_bytes(file.read_bytes()[:-8])),
+        "shape": lambda: save_file(good | {"map": np.zeros(3)}, file),
+        "names": lambda: save_file({"other": np.zeros(3)}, file),
+        "nan": lambda: save_file(good | {"map": np.full(SHAPE, np.nan)}, file),
+        "other": lambda: tensors.write(file, good, {"label": "bc"}),
+        "folder": file.mkdir,
+    }
+    made[kind]()
+    return file
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        ("missing", "No such file or directory: missing.safetensors"),
+        ("empty", "empty.safetensors is damaged or no safetensors file"),
+        ("pickle", "pickle.safetensors is damaged or no safetensors file"),
+        ("header", "header.safetensors is damaged or no safetensors file"),
+        ("nested", "nested.safetensors is damaged or no safetensors file"),
+        ("cut", "cut.safetensors is damaged or no safetensors file"),
+        ("shape", "shape.safetensors holds no weights that fit 'toy-0.1' (ValueError: matmul"),
+        ("names", "names.safetensors holds no weights that fit 'toy-0.1' (KeyError: 'map')"),
+        ("nan", "nan.safetensors holds numbers in 'map' that are not finite"),
+        ("other", "other.safetensors holds weights of 'bc', not of 'toy-0.1'"),
+        ("folder", "folder.safetensors"),
+    ],
+)
+def test_files_that_are_no_weights_are_one_line(here: Path, complaint: Callable[..., str], kind: str, expected: str):
+    assert expected in complaint(*evaluate("--weights", damaged(here, kind).name))
+    assert not (here / "runs").exists()
+
+
+def test_what_cannot_be_evaluated_is_one_line(here: Path, complaint: Callable[..., str]):
+    assert "method 'exp' has no weights" in complaint("eval", "--method", "exp")
+    file = damaged(here, "other").name
+    assert "method 'exp' has no weights" in complaint("eval", "--method", "exp", "--weights", file)
+    assert "give one --seed, or none" in complaint(*evaluate("--weights", file, "--seed", "0", "1"))

@@ -1,0 +1,162 @@
+"""`dextron-bench view` from the command line: the right recordings are opened, and made where they are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import rerun as rr
+
+from dextron_bench import recording
+from dextron_bench.cli import main as cli
+from dextron_bench.success import network
+from tests.helpers import fixed_success_model, tiny_benchmark
+
+NOTHING = "runs/nothing/synthetic/seed0"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A working folder in the tiny world with two runs: one of two solved episodes, one of two that failed."""
+    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    words = ["--split", "test", "--no-floors", "--quiet", "--json"]
+    assert cli.main(["run", "--method", "exp", "--record", "1", *words]) == 0
+    assert cli.main(["run", "--method", "nothing", "--record", "0", *words]) == 0
+    yield tmp_path
+    tiny_benchmark.forget()
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What the viewer, which needs a screen, was given."""
+    found: list[str] = []
+
+    def view(files: Sequence[Path]) -> None:
+        assert all(file.is_file() for file in files)
+        found.extend(str(file) for file in files)
+
+    monkeypatch.setattr(recording, "view", view)
+    return found
+
+
+def test_without_a_wish_what_is_there_is_opened(here: Path, opened: list[str]):
+    assert cli.main(["view"]) == 0
+    assert cli.main(["view", "runs/exp/synthetic/seed0"]) == 0
+    assert cli.main(["view", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]) == 0
+    assert opened == ["runs/exp/synthetic/seed0/recordings/test-0000.rrd"] * 3
+    assert not (here / NOTHING / "recordings").exists()
+
+
+def test_the_worst_and_the_best_are_opened_together_and_told(
+    here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
+):
+    capsys.readouterr()
+    assert cli.main(["view", "--worst", "1", "--best", "1", "--quiet"]) == 0
+    assert opened == [f"{NOTHING}/recordings/test-0000.rrd", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]
+    printed = capsys.readouterr()
+    assert [word in printed.out for word in ("nothing", "exp", "solved", "return")] == [True] * 4
+    assert printed.err == ""
+    made = recording.read(here / opened[0])
+    assert made.properties["method"] == "nothing"
+    row = pd.read_parquet(here / NOTHING / "episodes.parquet").iloc[0]
+    assert (made.episode.score, len(made.episode.actions)) == (row["score"], row["length"])
+
+
+def test_files_are_printed_for_other_programs(here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]):
+    capsys.readouterr()
+    words = ["--failed", "--print", "--method", "nothing", "--split", "test", "--reaches", "synthetic", "--seed", "0"]
+    assert cli.main(["view", ".", *words]) == 0
+    printed = capsys.readouterr()
+    assert (opened, printed.err) == ([], "")
+    assert printed.out.splitlines() == [f"{NOTHING}/recordings/test-000{row}.rrd" for row in (0, 1)]
+    assert cli.main(["view", "--runs", "runs", "--row", "1", "--print"]) == 0
+    assert [line.split("/")[1] for line in capsys.readouterr().out.splitlines()] == ["exp", "nothing"]
+
+
+def test_what_is_damaged_is_named_and_the_rest_is_opened(
+    here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
+):
+    assert cli.main(["view", "--quiet", "--split", "test"]) == 0
+    first, *others = list(opened)
+    opened.clear()
+    content = bytearray(Path(first).read_bytes())
+    content[len(content) // 2] ^= 1
+    Path(first).write_bytes(content)
+    capsys.readouterr()
+    assert cli.main(["view", "runs"]) == 1
+    assert opened == others
+    assert capsys.readouterr().err == (
+        f"dextron-bench: {first}: is not the file whose SHA-256 was kept; it was damaged or changed after writing\n"
+    )
+
+
+def test_where_more_match_it_says_how_to_have_them(
+    here: Path, opened: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    from dextron_bench.runs import selection as gallery
+
+    monkeypatch.setattr(gallery, "LIMIT", 1)
+    assert cli.main(["view", "--split", "test"]) == 0
+    assert "4 episodes are as asked for, these are the first 1; --worst 4 takes all" in capsys.readouterr().err
+    assert len(opened) == 1
+
+
+def test_what_cannot_be_opened_is_one_line(here: Path, opened: list[str], complaint: Callable[..., str]):
+    assert "no recordings at data" in complaint("view", "data")
+    assert "there is no nowhere" in complaint("view", "nowhere")
+    assert "is no .rrd file" in complaint("view", NOTHING + "/episodes.parquet")
+    assert "no runs at data to pick episodes from" in complaint("view", "data", "--failed")
+    assert "there are exp, nothing" in complaint("view", "--method", "bc")
+    assert "pick 1 episode or more" in complaint("view", "--worst", "0")
+    assert "of 4 episodes 0 are as asked for" in complaint("view", "--failed", "--method", "exp")
+    file = "runs/exp/synthetic/seed0/recordings/test-0000.rrd"
+    assert "is a file: episodes are picked from runs" in complaint("view", file, "--worst", "1")
+    table = here / NOTHING / "episodes.parquet"
+    pd.read_parquet(table).drop(columns="actions").to_parquet(table)
+    assert "its actions were not kept; remove" in complaint("view", "--method", "nothing", "--quiet")
+    table.write_bytes(b"")
+    assert f"{NOTHING}/episodes.parquet is damaged" in complaint("view", "--worst", "1")
+    assert opened == []
+
+
+def test_two_runs_are_put_side_by_side_on_a_row_that_only_one_solves(here: Path, opened: list[str]):
+    assert cli.main(["view", "--diff", "runs/exp", NOTHING]) == 0
+    assert opened == ["runs/pairs/exp-0--nothing-0--test-0000.rrd"]
+    assert cli.main(["view", "--diff", "runs/exp", NOTHING, "--row", "1"]) == 0
+    assert opened[1] == "runs/pairs/exp-0--nothing-0--test-0001.rrd"
+    files = ["runs/exp/synthetic/seed0/recordings/test-0000.rrd", f"{NOTHING}/recordings/test-0000.rrd"]
+    assert cli.main(["view", "--diff", *files]) == 0
+    assert len(opened) == 3
+
+
+def test_what_cannot_be_side_by_side_is_one_line(here: Path, complaint: Callable[..., str]):
+    assert "--diff takes two places" in complaint("view", "--diff", "runs/exp")
+    assert "no episode has row 7" in complaint("view", "--diff", "runs/exp", NOTHING, "--row", "7")
+
+
+def test_a_policy_at_work_is_watched(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
+):
+    @contextmanager
+    def theatre() -> Iterator[tuple[Callable[[rr.RecordingStream], None], Callable[[], int]]]:
+        yield lambda stream: stream.save(here / "live.rrd"), lambda: 0
+
+    monkeypatch.setattr(recording, "theatre", theatre)
+    monkeypatch.setattr(network, "shipped", lambda reaches: fixed_success_model.model(0.5))
+    capsys.readouterr()
+    assert cli.main(["view", "--live", "--method", "nothing", "--row", "1", "--speed", "0"]) == 0
+    assert capsys.readouterr().out == "nothing on row 1 of test: 0 of 20\n"
+    assert (here / "live.rrd").stat().st_size > 100_000
+    assert "takes one --method" in complaint("view", "--live")
+    assert "--speed -1: it plays so many times" in complaint("view", "--live", "--method", "exp", "--speed", "-1")
+    assert "has rows 0 to 1, not 9" in complaint("view", "--live", "--method", "nothing", "--row", "9")
+    assert "no weights of 'rl' ship for synthetic reaches and seed 7" in complaint(
+        "view", "--live", "--method", "rl", "--seed", "7"
+    )
+    assert "test of synthetic reaches has rows 0 to 1, not 9" in complaint(
+        "view", "--live", "--method", "exp", "--row", "9"
+    )

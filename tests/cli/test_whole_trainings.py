@@ -1,0 +1,88 @@
+"""Whole trainings from the command line: the paper's table at once, and a learner that is killed again and again."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from baselines import schedule
+from dextron_bench.cli import main as cli
+from tests.helpers import tiny_benchmark, tiny_training
+from tests.helpers.tiny_training import TOY
+
+FAST = ["--split", "test", "--seed", "0", "1", "--quiet", "--record", "0"]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty working folder in the tiny world."""
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    tiny_benchmark.forget()
+
+
+def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("baselines.cycle.FRAMES", 60)
+    monkeypatch.setattr("baselines.bc.STEPS", 5)
+    monkeypatch.setitem(schedule.SCHEDULES, "smoke", schedule.Schedule(epochs=2, warm_start=60, period=1))
+    words = ["run", "--all", "--preset", "smoke", *FAST, "--json"]
+    assert cli.main(words) == 0
+    found = {row["method"]: row for row in json.loads(capsys.readouterr().out)}
+    trained = {"bc-smoke", "rl-smoke", "rlil-0.1-smoke", "rlil-0.3-smoke", "sim-0.1-smoke", "sor-smoke"}
+    assert found.keys() == {"exp", "nothing", "random"} | trained
+    assert found["exp"]["return"] == 20.0
+    assert {name: row["reaches"] for name, row in found.items() if row["reaches"] != "synthetic"} == {
+        "sim-0.1-smoke": "minjerk"
+    }
+    of = {
+        name: here / "runs" / name / "seed1" / "weights.safetensors"
+        for name in ("sim-0.1-smoke/minjerk", "sor-smoke/synthetic")
+    }
+    assert len({file.read_bytes() for file in of.values()}) == 1
+    assert cli.main([*words, "--dry-run"]) == 0
+    assert json.loads(capsys.readouterr().out) == []  # All is done.
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "latest"),
+    [
+        (["--method", TOY, "--wait", "0.2"], 0.3),
+        (["--method", "rlil", "--preset", "smoke"], 1.0),
+    ],
+    ids=["toy", "rlil"],
+)
+def test_killed_again_and_again_it_ends_as_an_unbroken_run(here: Path, words: list[str], latest: float):
+
+    def start(folder: str) -> Any:
+        return tiny_benchmark.start(here / "data", "run", *words, *FAST, "--no-floors", "--runs", folder)
+
+    def files() -> set[Path]:
+        return {file for file in (here / "broken").rglob("*") if file.is_file()}
+
+    assert start("whole").wait(timeout=300) == 0
+    kills, rng = 0, random.Random(0)
+    for _ in range(4):
+        before, process = files(), start("broken")
+        while process.poll() is None and files() <= before:
+            time.sleep(0.01)
+        time.sleep(rng.uniform(0.0, latest))
+        if process.poll() is None:
+            process.send_signal(signal.SIGKILL)
+            kills += 1
+        process.communicate()
+    process = start("broken")
+    _, err = process.communicate(timeout=300)
+    assert (process.returncode, err) == (0, "")
+    assert kills >= 2  # The others ended before their time came.
+    whole, broken = tiny_training.contents(here / "whole"), tiny_training.contents(here / "broken")
+    assert whole == {name: content for name, content in broken.items() if not re.search(r"\.part$", name)}

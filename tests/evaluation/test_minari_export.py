@@ -1,0 +1,192 @@
+"""Episodes as a Minari data set: what Minari loads is what was played, and something can be learned from it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from baselines.floors import Nothing
+from dextron_bench.cli import main as cli
+from dextron_bench.evaluation import minari_export as export
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.reaches.setting import Setting
+from dextron_bench.splits.loading import Split
+from dextron_bench.storage import hashing
+from dextron_bench.world.gym import GraspEnv
+from tests.helpers import tiny_benchmark, tiny_training
+from tests.helpers.short_reaches import SETTINGS, SOURCE
+
+minari = pytest.importorskip("minari", reason="Minari is not installed: pip install -e '.[minari]'")
+
+CASES = tuple(Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS[:3])
+SPLIT = Split("train", "synthetic", CASES, "5a5a")
+EXPERT, STILL = export.Player("expert", ExpertAgent()), export.Player("nothing", Nothing().agent(0), {"sha256": "0f"})
+NAME = "dextron/brief-v0"
+
+
+def write(into: Path, players: list[export.Player], split: Split = SPLIT, rows: int = 3, **options):
+    """Exports made-up reaches, and loads what Minari finds."""
+    return minari.MinariDataset(export.Export(NAME, split, rows, players).write(SOURCE, into, **options) / "data")
+
+
+def test_minari_loads_what_was_played_to_the_last_bit(tmp_path: Path):
+    loaded = write(tmp_path, [EXPERT, STILL], rows=2)
+    played = [episode for player in (EXPERT, STILL) for _, episode in sorted(dict(play(player, 2)).items())]
+    assert loaded.total_episodes == len(played) == 4
+    assert loaded.total_steps == sum(len(episode.actions) for episode in played)
+    for stored, episode in zip(loaded.iterate_episodes(), played, strict=True):
+        for kept, own in (
+            (stored.observations, episode.states),
+            (stored.actions, episode.actions),
+            (stored.rewards, episode.rewards),
+        ):
+            assert kept.dtype == np.float64
+            np.testing.assert_array_equal(kept, own)
+        assert (stored.terminations[-1], stored.truncations[-1]) == (episode.terminated, episode.truncated)
+        assert not stored.terminations[:-1].any()
+        assert not stored.truncations[:-1].any()
+
+
+def play(player: export.Player, rows: int):
+    return rollout(player.agent, SOURCE, CASES[:rows], threads=1)
+
+
+def test_episodes_say_how_they_can_be_played_again(tmp_path: Path):
+    loaded = write(tmp_path, [EXPERT])
+    for stored, told in zip(loaded, loaded.storage.get_episode_metadata(range(3)), strict=True):
+        env = GraspEnv(SOURCE)
+        env.reset(options={"setting": Setting(**told["setting"])})
+        steps = [env.step(action) for action in stored.actions]
+        np.testing.assert_array_equal([step[0] for step in steps], stored.observations[1:])
+        assert told["return"] == stored.rewards.sum()
+        assert told["is_success"] == (told["return"] == 20.0)
+        assert (told["player"], told["row"]) == ("expert", stored.id)
+
+
+def test_the_data_set_says_where_it_is_from(tmp_path: Path):
+    loaded = write(tmp_path, [EXPERT, STILL])
+    about = loaded.storage.metadata
+    assert about["dextron_bench"]["split"] == {"reaches": "synthetic", "name": "train", "digest": "5a5a", "rows": 3}
+    assert about["dextron_bench"]["players"] == [{"name": "expert"}, {"name": "nothing", "sha256": "0f"}]
+    assert about["dextron_bench"]["provenance"]["versions"]["mujoco"]
+    assert about["author"] == {export.CONTRIBUTORS}
+    assert about["algorithm_name"] == "expert, nothing"
+    assert about["dataset_size"] > 0.1  # Megabytes.
+    assert loaded.id == NAME
+    assert loaded.env_spec.kwargs == {"reaches": "synthetic"}
+    env = loaded.recover_environment()
+    assert isinstance(env.unwrapped, GraspEnv)
+    assert env.observation_space == loaded.observation_space
+
+
+def test_minari_finds_it_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    write(tmp_path, [STILL], rows=1)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    assert minari.load_dataset(NAME).total_episodes == 1
+    assert NAME in minari.list_local_datasets()
+
+
+def test_nothing_is_written_elsewhere_and_threads_change_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.delenv("MINARI_DATASETS_PATH", raising=False)
+    write(tmp_path / "a", [EXPERT], threads=1)
+    write(tmp_path / "b", [EXPERT], threads=2)
+    assert sorted(found.name for found in tmp_path.iterdir()) == ["a", "b"]
+    assert [found.name for found in (tmp_path / "a" / "dextron").iterdir()] == ["brief-v0"]
+    files = [found for found in (tmp_path / "a").rglob("*.*") if found.is_file() and found.parent.name != "data"]
+    assert len(files) == 6  # For each episode its arrays and its metadata.
+    assert all(
+        found.read_bytes() == (tmp_path / "b" / found.relative_to(tmp_path / "a")).read_bytes() for found in files
+    )
+
+
+def test_what_cannot_be_exported_is_told_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    class Mad(ExpertAgent):
+        def act(self, states: np.ndarray) -> np.ndarray:
+            return np.full((len(states), 1), np.nan)
+
+    with pytest.raises(export.BadExport, match=r"mad failed in row 0 of 'train': action is nan"):
+        write(tmp_path, [export.Player("mad", Mad())])
+    assert not list(tmp_path.rglob("*brief*"))
+    write(tmp_path, [STILL], rows=1)
+    with pytest.raises(export.BadExport, match="is there already; remove it, or choose another --name"):
+        write(tmp_path, [STILL], rows=1)
+    for name in ("../up-v0", "brief", "a b-v0", "/brief-v0"):
+        with pytest.raises(export.BadExport, match="names no data set"):
+            export.Export(name, SPLIT, 1, [STILL])
+    with pytest.raises(export.BadExport, match="at least one row"):
+        export.Export(NAME, SPLIT, 0, [STILL])
+    monkeypatch.setitem(sys.modules, "minari.dataset.minari_storage", None)
+    with pytest.raises(export.MissingMinari, match="pip install"):
+        write(tmp_path / "b", [STILL])
+
+
+def test_a_policy_fitted_to_it_beats_the_mean_action_on_episodes_held_out(tmp_path: Path):
+    rng = np.random.default_rng(0)
+    cases = tuple(Case(SOURCE.sample(rng), Expert(1.2, 0.4), 0.0) for _ in range(20))
+    loaded = write(tmp_path, [EXPERT], Split("train", "synthetic", cases, "5a5a"), len(cases))
+    learned, held = minari.split_dataset(loaded, sizes=[15, 5], seed=0)
+    (x, y), (seen, wanted) = transitions(learned), transitions(held)
+    mean, deviation = x.mean(0), x.std(0) + 1e-6
+    policy = fitted((x - mean) / deviation, y)
+    with torch.no_grad():
+        error = (policy((seen - mean) / deviation) - wanted).square().mean().item()
+    blind = (y.mean() - wanted).square().mean().item()
+    assert error < 0.4 * blind
+
+
+def transitions(loaded) -> tuple[torch.Tensor, torch.Tensor]:
+    """States (N, 48) and actions (N, 1) of all its episodes."""
+    episodes = list(loaded.iterate_episodes())
+    states = np.concatenate([episode.observations[:-1] for episode in episodes])
+    actions = np.concatenate([episode.actions for episode in episodes])
+    return torch.tensor(states).float(), torch.tensor(actions).float()
+
+
+def fitted(x: torch.Tensor, y: torch.Tensor) -> torch.nn.Module:
+    """A small policy after 300 steps of Adam."""
+    torch.manual_seed(0)
+    policy = torch.nn.Sequential(torch.nn.Linear(48, 32), torch.nn.Tanh(), torch.nn.Linear(32, 1))
+    adam = torch.optim.Adam(policy.parameters(), lr=3e-3)
+    for _ in range(300):
+        batch = torch.randint(len(x), (256,))
+        loss = (policy(x[batch]) - y[batch]).square().mean()
+        adam.zero_grad()
+        loss.backward()
+        adam.step()
+    return policy
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty working folder in the tiny world."""
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.setattr("baselines.bc.STEPS", 2)
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    tiny_benchmark.forget()
+
+
+def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
+    words = ["data", "export", "--into", "sets", "--split", "test"]
+    assert cli.main([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["name"], told["episodes"], told["solved"]) == ("dextron/synthetic-test-experts-v0", 2, 2)
+    assert told["folder"] == "sets/dextron/synthetic-test-experts-v0"
+    assert "is there already" in complaint(*words)
+    assert "no data set" in complaint(*words, "--name", "mine")
+    run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
+    assert cli.main(run) == 0
+    weights = "runs/bc-smoke/synthetic/seed0/weights.safetensors"
+    assert cli.main([*words, "--weights", weights, "--rows", "1", "--author", "A. Person"]) == 0
+    about = minari.MinariDataset("sets/dextron/synthetic-test-policies-v0/data").storage.metadata
+    assert about["author"] == {"A. Person"}
+    assert about["dextron_bench"]["players"][0]["sha256"] == hashing.sha256(here / weights)
+    assert about["dextron_bench"]["split"]["rows"] == 1

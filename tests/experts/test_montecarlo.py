@@ -1,0 +1,123 @@
+"""The search: the same rows whatever interrupts it, and the distribution that the paper draws from."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dextron_bench.evaluation import rollout
+from dextron_bench.experts import blocks, montecarlo
+from dextron_bench.experts import policies as experts
+from dextron_bench.experts.blocks import Tally
+from dextron_bench.experts.montecarlo import Search, Share
+from dextron_bench.reaches import setting
+from dextron_bench.storage import folder_config
+from dextron_bench.world.engine import Engine
+from tests.helpers.short_reaches import SOURCE
+
+SMALL = Search("brief", seed=3, experts=3, block=4)
+
+
+def search(folder: Path, rows: int, slots: int = 12, threads: int = 1, share: Share | None = None) -> pd.DataFrame:
+    return montecarlo.run(SOURCE, SMALL, folder, rows, Engine(slots, threads), share=share)
+
+
+def test_draws_are_uniform_with_one_expert_in_each_band():
+    draws = montecarlo.draw(SOURCE, Search("brief", experts=4, block=500), block=0)
+    assert len(draws) == 2000
+    low, high = experts.CRITICAL_DISTANCE
+    band = ((draws["critical"] - low) / (high - low) * 4).astype(int).to_numpy().reshape(500, 4)
+    assert (band == [0, 1, 2, 3]).all()
+    assert draws["gain"].between(1.0, 1.5).all()
+    assert draws["offset_x"].between(-0.06, 0.06).all()
+    assert (draws.groupby(np.arange(2000) // 4)["gain"].nunique() == 1).all()
+    assert abs(draws["critical"].mean() - 0.455) < 0.01
+    assert abs(draws["duration_noise"].mean()) < 0.15
+
+
+def test_a_block_depends_on_its_number_and_the_seed_alone():
+    first, again = montecarlo.draw(SOURCE, SMALL, 7), montecarlo.draw(SOURCE, SMALL, 7)
+    pd.testing.assert_frame_equal(first, again)
+    assert not first.equals(montecarlo.draw(SOURCE, SMALL, 8))
+    assert not first.equals(montecarlo.draw(SOURCE, Search("brief", 4, 3, 4), 7))
+
+
+def test_rows_are_the_same_at_any_slots_and_threads_in_shares_and_after_interruptions(tmp_path):
+    whole = search(tmp_path / "whole", rows=3)
+    assert (whole["score"] == 20).sum() >= 3
+    pd.testing.assert_frame_equal(search(tmp_path / "threads", 3, slots=40, threads=2), whole)
+    broken = tmp_path / "broken"
+    search(broken, rows=1)
+    stored = sorted((broken / "blocks").iterdir())
+    stored[0].unlink()
+    pd.testing.assert_frame_equal(search(broken, rows=3), whole)
+    pd.testing.assert_frame_equal(search(tmp_path / "whole", rows=3, share=Share(1, 2)), whole)
+
+
+def test_outcomes_are_those_of_a_naive_search(tmp_path):
+    found = search(tmp_path, rows=2)
+    agents = [experts.Expert(gain, critical) for gain, critical in zip(found["gain"], found["critical"], strict=True)]
+    cases = [experts.Case(s, e, 0.0) for s, e in zip(setting.from_frame(found), agents, strict=True)]
+    played = dict(rollout.rollout(experts.ExpertAgent(), SOURCE, cases, threads=1))
+    assert found["score"].tolist() == [played[i].score for i in range(len(cases))]
+    assert found["length"].tolist() == [len(played[i].actions) for i in range(len(cases))]
+
+
+def test_a_search_stops_with_the_first_blocks_that_reach_the_rows():
+    done = {0: Tally(1, 8, 3, 2), 1: Tally(1, 8, 0, 0), 2: Tally(1, 8, 5, 4), 4: Tally(1, 8, 9, 9)}
+    assert [blocks.last_needed(done, rows) for rows in (1, 2, 3, 6, 7)] == [0, 0, 2, 2, None]
+    assert blocks.total(done) == Tally(4, 32, 17, 15)
+
+
+def test_a_search_goes_on_from_what_a_database_kept(tmp_path):
+    def kept(draws: pd.DataFrame) -> pd.DataFrame:
+        return draws[draws["score"] > blocks.KEPT].astype({"length": int}).reset_index(drop=True)
+
+    first = search(tmp_path / "first", rows=1)
+    count = len(first) // (SMALL.block * SMALL.experts)
+    montecarlo.restore(SOURCE, SMALL, tmp_path / "second", kept(first), count)
+    whole = search(tmp_path / "first", rows=3)
+    pd.testing.assert_frame_equal(kept(search(tmp_path / "second", rows=3)), kept(whole))
+    with pytest.raises(folder_config.FolderMismatch, match="row 0 of the database"):
+        montecarlo.restore(SOURCE, Search("brief", 4, 3, 4), tmp_path / "other", kept(first), count)
+
+
+def test_a_folder_holds_one_search(tmp_path):
+    search(tmp_path, rows=1)
+    with pytest.raises(folder_config.FolderMismatch, match="holds another search"):
+        montecarlo.run(SOURCE, Search("brief", seed=4, experts=3, block=4), tmp_path, 1, Engine(12, 1))
+
+
+def test_a_damaged_block_is_named(tmp_path):
+    search(tmp_path, rows=1)
+    block = sorted((tmp_path / "blocks").iterdir())[0]
+    block.write_bytes(block.read_bytes()[:100])
+    with pytest.raises(blocks.DamagedBlock, match=f"{block.name} is damaged"):
+        search(tmp_path, rows=1)
+
+
+@pytest.mark.parametrize("text", ["2/2", "-1/2", "half", "1"])
+def test_shares_that_do_not_exist(text):
+    with pytest.raises(montecarlo.BadSearch, match="share"):
+        Share.parse(text)
+
+
+@pytest.mark.slow
+def test_killed_at_any_moment_the_command_goes_on_to_the_same_rows(tmp_path):
+    words = [sys.executable, "-m", "dextron_bench", "mc", "--reaches", "minjerk", "--rows", "25", "--quiet", "--runs"]
+    subprocess.run([*words, str(tmp_path / "whole")], check=True, capture_output=True)
+    for delay in (3.0, 5.0, 8.0):
+        started = subprocess.Popen([*words, str(tmp_path / "killed")], stdout=subprocess.DEVNULL)
+        time.sleep(delay)
+        started.send_signal(signal.SIGKILL)
+        started.wait()
+    subprocess.run([*words, str(tmp_path / "killed")], check=True, capture_output=True)
+    name = os.path.join("mc", "minjerk", "seed0", "experts-minjerk.parquet")
+    whole, killed = ((tmp_path / run / name).read_bytes() for run in ("whole", "killed"))
+    assert whole == killed

@@ -1,0 +1,124 @@
+"""Submissions to a tiny benchmark, taken apart and put together again with hashes that are right."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from dextron_bench.leaderboard.submission import bundle, verification
+from dextron_bench.leaderboard.submission import playing as contest
+from dextron_bench.leaderboard.submission.verdict import Verdict
+from dextron_bench.methods.isolation.isolated_agent import Limits
+from dextron_bench.runs import run_files as records
+from dextron_bench.storage import hashing
+from tests.helpers import tiny_benchmark
+
+AGENT = """
+import numpy as np
+from dextron_bench.world import task
+
+
+class Near:
+    name = "near"
+
+    def __init__(self, near=0.06):
+        self.near = near
+
+    def agent(self, seed):
+        return self
+
+    def reset(self, episodes):
+        pass
+
+    def act(self, states):
+        return np.where(task.distance(states) <= self.near, 1.0, -1.0)[:, None]
+"""
+ROWS = pd.concat(
+    [tiny_benchmark.ROWS, pd.DataFrame([("test", *tiny_benchmark.FALLS)], columns=tiny_benchmark.COLUMNS)],
+    ignore_index=True,
+)
+
+
+@dataclass
+class Forgery:
+    """A submission taken apart, to be changed and put together again with hashes that are right."""
+
+    folder: Path
+    board: Path
+
+    @property
+    def seed(self) -> Path:
+        return self.folder / "seed0"
+
+    def table(self, change: Callable[[pd.DataFrame], pd.DataFrame]) -> None:
+        """Changes the table of episodes."""
+        records.store(self.seed, change(pd.read_parquet(self.seed / records.EPISODES)))
+
+    def json(self, name: str, change: Callable[[dict[str, Any]], object]) -> None:
+        """Changes a JSON file."""
+        value = json.loads((self.folder / name).read_text())
+        change(value)
+        (self.folder / name).write_text(json.dumps(value))
+
+    def conclude(self) -> None:
+        """Makes the result that of the changed episodes."""
+        told = pd.read_parquet(self.seed / records.EPISODES)
+        self.json("seed0/result.json", lambda result: result.update(splits=records.scores(told)))
+
+    def checked(self, **how: Any) -> Verdict:
+        """What verification finds after all hashes were made right."""
+        manifest = json.loads((self.folder / bundle.MANIFEST).read_text())
+        names = {str(each.relative_to(self.folder)): each for each in self.folder.rglob("*") if each.is_file()}
+        hashes = {name: hashing.sha256(each) for name, each in names.items() if name != bundle.MANIFEST}
+        file = self.folder.with_suffix(".zip")
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr(bundle.MANIFEST, json.dumps(manifest | {"files": hashes}))
+            for name in hashes:
+                archive.write(names[name], name)
+        into = self.folder.with_name("again")
+        shutil.rmtree(into, ignore_errors=True)
+        return verification.verify(into, bundle.unpack(file, into), self.board, threads=1, **how)
+
+
+def submitted(here: Path) -> Iterator[Path]:
+    """A folder with a sound bundle of two seeds on a tiny benchmark, which is there until the end."""
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            tiny_benchmark.write(here / "splits", ROWS)
+            tiny_benchmark.install(here / "splits", patch.setattr)
+            (here / "near.py").write_text(AGENT)
+            entry = contest.Entry("near", f"{here}/near.py:Near", tiny_benchmark.NAME, (0, 1))
+            folder = contest.compete(entry, here / "runs", 1, Limits(start=300.0, answer=100.0), threads=1)
+            contest.finish(entry, folder, here / "near.zip")
+            yield here
+    finally:
+        tiny_benchmark.forget()
+
+
+def taken_apart(file: Path, here: Path) -> Forgery:
+    """The bundle of a file, to be changed."""
+    folder = here / "forged"
+    bundle.unpack(file, folder)
+    with zipfile.ZipFile(file) as archive:
+        (folder / bundle.MANIFEST).write_bytes(archive.read(bundle.MANIFEST))
+    return Forgery(folder, here / "board")
+
+
+def row(number: int, **changes: Any) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    """Changes one row of `test`."""
+
+    def change(table: pd.DataFrame) -> pd.DataFrame:
+        here = (table["split"] == "test") & (table["row"] == number)
+        for name, value in changes.items():
+            table[name] = [value if found else old for found, old in zip(here, table[name], strict=True)]
+        return table
+
+    return change

@@ -1,0 +1,235 @@
+"""The leaderboard's page in a browser, from disk: what it shows is the table's, whatever methods are called."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.leaderboard import page
+from dextron_bench.scores import standings as leaderboard
+from dextron_bench.splits import loading as splits
+from tests.helpers.browser import visit
+
+BOARD = Path(__file__).parents[3] / "leaderboard"
+PUBLISHED = (BOARD / page.FILE).as_uri()
+ALL = f"{PUBLISHED}#reaches=&split="  # Without the choice that the page begins with.
+EVIL = "<script>alert(1)</script>", """"><img src=x onerror=alert(1)>'&amp; $x$ ]]>"""
+Table = dict[tuple[str, str, str], dict[str, Any]]  # Rows by method, source of reaches and split.
+NAMES = "method", "success", "frames"
+
+
+@pytest.fixture(scope="module")
+def table() -> Table:
+    return pd.read_csv(BOARD / "table.csv").set_index(["method", "reaches", "split"]).to_dict("index")  # type: ignore[return-value]
+
+
+@pytest.fixture
+def evil(tmp_path: Path) -> str:
+    """The address of a page of methods whose names, tiers and machines are no names at all."""
+    rows = leaderboard.table([*map(result, EVIL)]).assign(rank=[1, 1], iqm=[19.5, 18.25], regret=[0.5, 1.75])
+    points = pd.DataFrame({"epoch": [10, 20], "return": [1.0, 2.0]})
+    curves = {"minjerk": {method: {0: points} for method in EVIL}}
+    file = tmp_path / page.FILE
+    file.write_text(page.document(rows, map(result, EVIL), curves, tmp_path), encoding="utf-8")
+    return file.as_uri()
+
+
+def result(method: str) -> dict[str, Any]:
+    split = splits.load("minjerk", "test")
+    scores = [20.0] * 150 + [0.0] * 50
+    found = {"digest": split.digest, "scores": scores, "failed": 0, "closing_lag": 0.1}
+    training = {"label": method + "!", "frames": 1000, "demonstrations": 12_345, "seconds": 5400.0}
+    return {
+        **{"method": method, "reaches": "minjerk", "seed": 0, "tier": "re-run", "privileged": method},
+        "splits": {"test": {**found, "causes": {"solved": 150, "slipped": 50}}},
+        "provenance": {"machine": {"cpu": method, "cores": 2}},
+        "training": training,
+    }
+
+
+def shown(page: Any) -> list[str]:
+    """The methods of the rows that are visible, from the top."""
+    return page.eval_on_selector_all(
+        "#standings tbody tr",
+        "rows => rows.filter(r => r.checkVisibility()).map(r => r.querySelector('.name').innerText)",
+    )
+
+
+def cells(page: Any) -> list[dict[str, Any]]:
+    """Every row's cells by column: what is shown, and the value that is sorted by."""
+    return page.eval_on_selector_all(
+        "#standings tbody tr",
+        """rows => rows.map(row => Object.fromEntries([...row.cells].map(
+            cell => [cell.dataset.name, [cell.textContent, cell.dataset.value]])))""",
+    )
+
+
+def test_every_number_of_the_table_is_that_of_the_rows(browser: Any, table: Table):
+    with visit(browser, ALL) as opened:
+        found = cells(opened)
+    assert len(found) == len(table) + 1
+    quoted = [row for row in found if row["tier"][0] == "quoted"]
+    assert [(row["return"][0], row["success"][0].strip()) for row in quoted] == [("15.00 ", "75.0")]
+    for row in found:
+        if row["tier"][0] == "quoted":
+            continue
+        name = row["method"][0].partition("ceiling")[0].partition("floor")[0].partition("policy of")[0]
+        own = table[name, row["reaches"][0], row["split"][0]]
+        assert float(row["return"][1]) == pytest.approx(own["return"], rel=1e-5)
+        interval = f"{own['return']:.2f} [{own['return_low']:.2f}, {own['return_high']:.2f}]"
+        assert row["return"][0] == interval
+        rates = [f"{100 * own[f'success{end}']:.1f}" for end in ("", "_low", "_high")]
+        assert row["success"][0] == f"{rates[0]} [{rates[1]}, {rates[2]}]"
+        assert row["seeds"][0] == str(own["seeds"])
+
+
+def test_endings_are_those_of_the_rows(browser: Any, table: Table):
+    with visit(browser, ALL) as opened:
+        parts = opened.eval_on_selector_all(
+            "[data-split]:has(.endings)",
+            """parts => parts.map(part => [part.dataset.reaches, part.dataset.split,
+                [...part.querySelectorAll("tbody tr")].map(row => [...row.cells].map(
+                    cell => cell.querySelector("svg") ? "" : cell.innerText))])""",
+        )
+    assert len(parts) == 6
+    for reaches, split, rows in parts:
+        for method, _, *shares, lag in rows:
+            own = table[method, reaches, split]
+            assert shares == [f"{100 * own[cause] / own['episodes']:.1f}" for cause in CAUSES]
+            assert lag in (f"{own['closing_lag']:.2f}", "\N{EN DASH}")
+
+
+def test_heat_maps_weigh_up_to_the_rate_of_the_row(browser: Any, table: Table):
+    with visit(browser, f"{PUBLISHED}#reaches=real&split=test") as opened:
+        for heat in opened.locator(".heat").locator("visible=true").all():
+            rows = heat.evaluate(
+                """table => [...table.rows].map(row => [row.cells[0].innerText, ...[...row.querySelectorAll("td")].map(
+                    cell => [cell.dataset.value ?? null, cell.innerText])])"""
+            )
+            settings = [int(text) for _, text in rows[-1][1:]]
+            assert sum(settings) == 500
+            rates = [float(value or 0.0) for value, _ in next(row for row in rows if row[0] == "rlil-0.1")[1:]]
+            mean = sum(rate * count for rate, count in zip(rates, settings, strict=True)) / 500
+            assert mean == pytest.approx(table["rlil-0.1", "real", "test"]["success"], abs=1e-4)
+
+
+def test_it_begins_with_test_of_real_and_filters(browser: Any, table: Table):
+    best = [name for name, *rest in table if rest == ["real", "test"]]
+    with visit(browser, PUBLISHED) as opened:
+        assert shown(opened) == [*best, "RLIL 0.1"]
+        assert opened.locator("#count").inner_text() == f"{len(best) + 1} of {len(table) + 1} rows"
+        opened.select_option("[name=tier]", "quoted")
+        assert shown(opened) == ["RLIL 0.1"]
+        opened.select_option("[name=tier]", "")
+        opened.fill("[name=text]", "SOR")
+        assert shown(opened) == [name for name in best if "sor" in name] != []
+        opened.fill("[name=text]", "")
+        opened.select_option("[name=split]", "train")
+        assert shown(opened) == ["exp"]
+        assert opened.locator("section:has(#how-episodes-end) .nothing").is_visible()
+        opened.reload()  # The choice is kept in the address.
+        assert shown(opened) == ["exp"]
+        opened.select_option("[name=reaches]", "minjerk")
+        assert shown(opened) == []
+        opened.select_option("[name=split]", "test")
+        assert shown(opened) == [name for name, *rest in table if rest == ["minjerk", "test"]] != []
+        assert not opened.locator("section:has(#how-episodes-end) .nothing").is_visible()
+        assert opened.locator("figure[data-reaches]").locator("visible=true").count() == 1
+
+
+def test_headings_sort_by_click_and_by_key_and_say_so(browser: Any):
+    with visit(browser, PUBLISHED) as opened:
+        headings = {name: opened.locator(f"#standings th[scope=col][data-name={name}]") for name in NAMES}
+        heading = headings["success"]
+        heading.get_by_role("button").click()
+        assert heading.get_attribute("aria-sort") == "descending"
+        assert shown(opened)[:3] == ["exp", "reflex", "rlil-0.1"]
+        opened.keyboard.press("Enter")  # The button has the focus.
+        assert heading.get_attribute("aria-sort") == "ascending"
+        assert shown(opened)[-1] == "exp"
+        assert "by success, ascending" in opened.locator("#count").inner_text()
+        headings["frames"].get_by_role("button").press("Space")
+        assert heading.get_attribute("aria-sort") == "none"
+        places = [shown(opened).index(name) for name in ("rlil-0.1", "RLIL 0.1", "rlil-0.1-quick")]
+        assert places == sorted(places)  # A million, 750,000 and 200,000.
+        assert set(shown(opened)[-3:]) <= {"exp", "reflex", "omega", "bc-quick", "nothing", "random"}  # Unknown: last.
+        headings["method"].get_by_role("button").click()
+        assert shown(opened) == sorted(shown(opened), key=str.lower)
+
+
+def test_the_keyboard_reaches_everything(browser: Any):
+    with visit(browser, PUBLISHED) as opened:
+        reached = []
+        for _ in range(12):
+            opened.keyboard.press("Tab")
+            reached.append(opened.evaluate("document.activeElement.name || document.activeElement.innerText"))
+        assert reached[:5] == ["To the table", "reaches", "split", "tier", "text"]
+        assert "method" in reached
+        unnamed = opened.eval_on_selector_all(
+            "[tabindex], a, button, select, input",
+            """found => found.filter(each => each.checkVisibility() && !(each.ariaLabel || each.innerText
+                || each.labels?.length || each.getAttribute("aria-labelledby")))""",
+        )
+        assert unnamed == []
+
+
+def test_it_reads_without_a_script(browser: Any, table: Table):
+    with visit(browser, PUBLISHED, java_script_enabled=False) as opened:
+        assert opened.locator("#standings tbody tr").locator("visible=true").count() == len(table) + 1
+        assert not opened.locator(".controls").is_visible()
+        assert opened.locator("figure svg").locator("visible=true").count() == 4
+
+
+def test_it_has_one_caption_a_table_and_a_name_for_each_picture(browser: Any):
+    with visit(browser, ALL) as opened:
+        assert opened.evaluate("[...document.querySelectorAll('table')].every(t => t.caption?.textContent)")
+        assert opened.evaluate("[...document.querySelectorAll('th')].every(h => h.scope)")
+        svgs = "[...document.querySelectorAll('svg')].every(s => s.ariaHidden === 'true' || s.ariaLabel)"
+        assert opened.evaluate(svgs)
+        ids = opened.evaluate("[...document.querySelectorAll('[id]')].map(e => e.id)")
+        assert len(ids) == len(set(ids))
+
+
+def test_names_of_strangers_are_text_wherever_they_stand(browser: Any, evil: str):
+    with visit(browser, f"{evil}#reaches=&split=") as opened:
+        opened.on("dialog", lambda dialog: pytest.fail(dialog.message))
+        assert shown(opened) == [*sorted(EVIL)]
+        assert opened.evaluate("[document.scripts.length, document.images.length]") == [1, 0]
+        for name in EVIL:
+            assert opened.get_by_text(name, exact=True).count() >= 4  # The table, endings, heat map, and the curves.
+        found = cells(opened)
+        assert [row["rank"][0] for row in found] == ["1", "1"]
+        assert [row["IQM"][0] for row in found] == ["19.50", "18.25"]
+        assert [row["regret"][0] for row in found] == ["0.50", "1.75"]
+        assert {(row["tier"][0], row["frames"][0], row["demos"][0]) for row in found} == {("re-run", "1,000", "12,345")}
+        assert found[0]["wall time"][0] == f"1.5 h{sorted(EVIL)[0]}, 2 cores"
+        assert found[0]["privileged"][0] == sorted(EVIL)[0]
+
+
+def test_no_script_but_its_own_may_run(browser: Any, tmp_path: Path):
+    """Should a name ever get through unescaped, the browser refuses it."""
+    file = tmp_path / page.FILE
+    file.write_text((BOARD / page.FILE).read_text().replace("</main>", "<script>window.ran = 1</script></main>"))
+    opened = browser.new_page()
+    opened.goto(file.as_uri())
+    assert opened.evaluate("window.ran") is None
+    assert opened.locator("#count").inner_text()  # The page's own script did run.
+    opened.close()
+
+
+def test_links_to_recordings_lead_to_files_that_ship(browser: Any):
+    with visit(browser, ALL) as opened:
+        links = opened.eval_on_selector_all("a[href$='.rrd']", "links => links.map(a => a.getAttribute('href'))")
+    files = {(BOARD / link).resolve() for link in links}
+    assert {file.parent for file in files} == {BOARD.parent / "recordings"}
+    assert files == set((BOARD.parent / "recordings").glob("*.rrd"))
+
+
+def test_equal_results_make_equal_pages(tmp_path: Path):
+    rows = leaderboard.table(map(result, EVIL))
+    made = {page.document(rows, map(result, EVIL), {}, tmp_path) for _ in range(2)}
+    assert len(made) == 1

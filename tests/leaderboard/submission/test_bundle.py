@@ -1,0 +1,140 @@
+"""Bundles from strangers: paths, kinds, links, sizes and hashes that no bundle of the tool has are refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import stat
+import warnings
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from dextron_bench.leaderboard.submission import bundle
+from dextron_bench.leaderboard.submission import playing as contest
+from tests.helpers import tiny_benchmark
+
+
+class Unsafe:
+    """Makes bundles that nobody's tool would."""
+
+    def __init__(self, sound: Path, file: Path) -> None:
+        with zipfile.ZipFile(sound) as archive:
+            self.members = [(info, archive.read(info)) for info in archive.infolist()]
+        self.file = file
+
+    def add(self, name: str | zipfile.ZipInfo, content: bytes = b"") -> Unsafe:
+        info = name if isinstance(name, zipfile.ZipInfo) else zipfile.ZipInfo(name)
+        info.compress_type = zipfile.ZIP_DEFLATED
+        self.members.append((info, content))
+        return self
+
+    def refused(self, into: Path) -> str:
+        """Why it is refused, after nothing was written but in the folder it was to go to."""
+        with zipfile.ZipFile(self.file, "w") as archive, warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Duplicate name")
+            for info, content in self.members:
+                archive.writestr(info, content)
+        before = sorted(into.parent.rglob("*"))
+        with pytest.raises(bundle.BadBundle) as caught:
+            bundle.unpack(self.file, into)
+        assert [path for path in sorted(into.parent.rglob("*")) if not path.is_relative_to(into)] == before
+        return str(caught.value)
+
+
+@pytest.fixture
+def unsafe(submitted: Path, tmp_path: Path) -> Unsafe:
+    return Unsafe(submitted / "near.zip", tmp_path / "unsafe.zip")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../evil.py",
+        "/etc/passwd",
+        "agent/../../evil.py",
+        "agent\\evil.py",
+        "agent/weights.pkl",
+        "seed0/x.parquet",
+        "C:x",
+    ],
+)
+def test_paths_and_kinds_that_no_bundle_has_are_refused(name: str, unsafe: Unsafe, tmp_path: Path):
+    assert f"a bundle has no file {name!r}" in unsafe.add(name, b"x").refused(tmp_path / "into")
+
+
+def test_ways_of_packing_that_hide_sizes_are_refused(unsafe: Unsafe, tmp_path: Path):
+    unsafe.add("agent/zeros.pt", bytes(2**20))
+    unsafe.members[-1][0].compress_type = zipfile.ZIP_BZIP2
+    assert "agent/zeros.pt is packed in a way" in unsafe.refused(tmp_path / "into")
+
+
+def test_links_twins_and_strays_are_refused(submitted: Path, unsafe: Unsafe, tmp_path: Path):
+    link = zipfile.ZipInfo("agent/link.py")
+    link.external_attr = (stat.S_IFLNK | 0o777) << 16
+    assert "is a link" in unsafe.add(link, b"/etc/passwd").refused(tmp_path / "into")
+    twin = Unsafe(submitted / "near.zip", unsafe.file).add("seed0/result.json", b"{}")
+    assert "holds seed0/result.json twice" in twin.refused(tmp_path / "into")
+    stray = Unsafe(submitted / "near.zip", unsafe.file).add("agent/more.py", b"")
+    assert "holds agent/more.py, which its manifest has not" in stray.refused(tmp_path / "into")
+
+
+def test_a_bomb_is_refused_before_it_is_unpacked(unsafe: Unsafe, tmp_path: Path):
+    bomb = unsafe.add("agent/zeros.pt", bytes(bundle.LARGEST + 1))
+    assert "agent/zeros.pt would unpack to too much (256 MiB)" in bomb.refused(tmp_path / "into")
+    assert bomb.file.stat().st_size < 2**21
+
+
+def test_a_bomb_of_many_files_is_refused(unsafe: Unsafe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(bundle, "TOTAL", 1000)
+    assert "would unpack to more than" in unsafe.refused(tmp_path / "into")
+
+
+def test_a_changed_byte_is_refused(submitted: Path, unsafe: Unsafe, tmp_path: Path):
+    for place, (info, content) in enumerate(unsafe.members):
+        if info.filename == "seed1/result.json":
+            unsafe.members[place] = (info, content.replace(b"20.0", b"19.0", 1))
+    assert "seed1/result.json is not the file whose SHA-256 the manifest has" in unsafe.refused(tmp_path / "into")
+    cut = tmp_path / "cut.zip"
+    cut.write_bytes((submitted / "near.zip").read_bytes()[:-30])
+    with pytest.raises(bundle.BadBundle, match="no whole zip file"):
+        bundle.unpack(cut, tmp_path / "other")
+
+
+def test_only_what_belongs_to_the_seeds_is_packed(submitted: Path, tmp_path: Path):
+    """A write that was cut off leaves its part, and a seed that was played is not always submitted."""
+    folder = submitted / "runs" / contest.FOLDER / "near" / tiny_benchmark.NAME
+    shutil.copytree(folder, tmp_path / "near")
+    (tmp_path / "near/seed0/.episodes.parquet.77.part").touch()
+    told = contest.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0,)).told()
+    found = bundle.pack(tmp_path / "near", told, {}, tmp_path / "near.zip")["files"]
+    assert {name.split("/")[0] for name in found} == {"seed0"}
+    assert not [name for name in found if "part" in name]
+
+
+def test_an_agents_file_that_no_bundle_takes_is_told_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    file = tmp_path / "_mine.py"
+    file.touch()
+    with pytest.raises(bundle.BadBundle, match=r"a bundle has no file 'agent/_mine\.py'"):
+        bundle.check_agent({file.name: file})
+    monkeypatch.setattr(bundle, "LARGEST", -1)
+    with pytest.raises(bundle.BadBundle, match="is larger than"):
+        bundle.check_agent({"mine.py": file})
+
+
+@pytest.mark.parametrize("hours", [float("nan"), float("inf"), 10**400, -1])
+def test_a_declaration_is_a_number(hours: float, submitted: Path):
+    with zipfile.ZipFile(submitted / "near.zip") as archive:
+        manifest = json.loads(archive.read(bundle.MANIFEST))
+    bundle.check(manifest, "bundle", Path("near.zip"))
+    manifest["declared"]["hours"] = hours
+    with pytest.raises(bundle.BadBundle):
+        bundle.check(manifest, "bundle", Path("near.zip"))
+
+
+def test_a_zip_of_something_else_is_named(tmp_path: Path):
+    with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
+        archive.writestr("bundle.json", '{"format": 1}')
+    with pytest.raises(bundle.BadBundle, match="'name' is a required property"):
+        bundle.unpack(tmp_path / "other.zip", tmp_path / "into")

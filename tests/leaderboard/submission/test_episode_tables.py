@@ -1,0 +1,56 @@
+"""Tables of episodes from strangers: each form that no run writes is refused in a line, whatever it is meant to do."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from dextron_bench.runs import run_files as records
+from tests.helpers.forged_bundles import Forgery, row
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (lambda table: table.assign(row=table["row"].astype("Int64").where(table.index > 0)), "without its row"),
+        (row(1, split=None), "without its split"),
+        (row(1, actions=None), "without its actions"),
+        (row(1, final=[0.0] * 47), "a last state that is not 48 numbers"),
+        (row(1, failure="x" * 2_000_000), "has texts of 20000"),
+        (lambda table: table.drop(columns="trace"), "it lacks b'trace'"),
+        (lambda table: table.drop(columns="score"), "differs in 'score'"),
+        (lambda table: table.assign(more=1), "differs in 'more'"),
+        (lambda table: table.assign(score="20"), "has large_string in column 'score'"),
+        (lambda table: pd.concat([table, table[:1]]), "has 5 episodes where the splits have 4"),
+    ],
+)
+def test_forms_that_no_run_writes_are_refused(change, why: str, forged: Forgery):
+    forged.table(change)
+    assert why in forged.checked().problems[0]
+
+
+def test_two_columns_of_a_name_are_refused(forged: Forgery):
+    file = forged.seed / records.EPISODES
+    table = pq.read_table(file)
+    twice = pa.Table.from_arrays([*table.columns, table.column("split")], names=[*table.column_names, "split"])
+    pq.write_table(twice, file)
+    assert "differs in 'split'" in forged.checked().problems[0]
+
+
+def test_more_row_groups_than_a_run_writes_are_refused(forged: Forgery, monkeypatch: pytest.MonkeyPatch):
+    file = forged.seed / records.EPISODES
+    monkeypatch.setattr("dextron_bench.leaderboard.submission.episode_tables.GROUPS", 3)
+    pq.write_table(pq.read_table(file), file, row_group_size=1)
+    assert "has 4 row groups; 3 are plenty" in forged.checked().problems[0]
+
+
+def test_what_is_no_table_is_refused(forged: Forgery):
+    (forged.seed / records.EPISODES).write_bytes(b"PAR1 nothing PAR1")
+    assert "is no table that can be read" in forged.checked().problems[0]
+
+
+def test_a_text_that_would_fill_the_memory_is_refused(forged: Forgery):
+    forged.table(row(2, failure="x" * 5000))
+    assert "has texts of more than 1000 letters in column 'failure'" in forged.checked().problems[0]

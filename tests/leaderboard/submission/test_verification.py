@@ -1,0 +1,226 @@
+"""Verification: what is sound is taken, and every way to cheat that we could think of is caught, and said."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dextron_bench import recording
+from dextron_bench.leaderboard.submission import playing as contest
+from dextron_bench.leaderboard.submission import result_check as differences
+from dextron_bench.methods.isolation.isolated_agent import Limits
+from dextron_bench.reaches import sources
+from dextron_bench.runs import run_files as records
+from dextron_bench.splits import loading as splits
+from dextron_bench.storage import provenance
+from tests.helpers import tiny_benchmark
+from tests.helpers.forged_bundles import Forgery, row
+
+
+def test_a_sound_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forged: Forgery):
+    """Of four episodes a seed one knocks the bottle over."""
+    verdict = forged.checked(rerun=True)
+    assert verdict.problems == []
+    assert verdict.notes[-1] == "all seeds have the same episodes: they count as one, not as several trainings"
+    assert (verdict.tier, verdict.episodes, verdict.exact) == ("re-run", 8, 8)
+    assert verdict.results[0]["splits"]["test"]["scores"] == [20.0, 20.0, 0.0]
+
+
+def test_equal_submissions_are_equal_bytes_and_nothing_is_played_twice(submitted: Path, tmp_path: Path):
+    entry = contest.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0, 1))
+
+    def forbidden(*_: object) -> None:
+        raise AssertionError("played again")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(contest, "shuffled", forbidden)
+        folder = contest.compete(entry, submitted / "runs", 1, Limits(), threads=1)
+    contest.finish(entry, folder, tmp_path / "again.zip")
+    assert (tmp_path / "again.zip").read_bytes() == (submitted / "near.zip").read_bytes()
+
+
+def test_episodes_are_played_in_an_order_that_depends_on_split_and_seed():
+    split = splits.Split("test", "synthetic", tuple(splits.cases(tiny_benchmark.ROWS)) * 20, "0" * 64)
+    first, second = contest.order(split, 0), contest.order(split, 1)
+    assert sorted(first) == list(range(len(split.cases)))
+    assert list(first) != list(range(len(first)))
+    assert list(first) != list(second)
+    assert list(contest.order(replace(split, digest="1" * 64), 0)) != list(first)
+
+
+def test_a_changed_reward_is_caught(forged: Forgery):
+    forged.table(row(2, score=20.0, success=True, cause="solved"))
+    forged.conclude()
+    assert "says success True; played again it is False" in forged.checked().problems[0]
+
+
+def test_a_changed_action_is_caught(forged: Forgery):
+    told = pd.read_parquet(forged.seed / records.EPISODES).query("split == 'test' and row == 0")
+    actions = np.array(told["actions"].iloc[0])
+    actions[-1] = np.nextafter(actions[-1], 0.0)
+    forged.table(row(0, actions=actions))
+    forged.conclude()
+    assert "hash of states, actions and rewards is another" in "".join(forged.checked().problems)
+
+
+def test_actions_that_are_none_or_too_few_are_caught(forged: Forgery):
+    forged.table(row(0, actions=np.array([2.0])))
+    assert "row 0 has actions that are not" in forged.checked().problems[0]
+    forged.table(row(0, actions=np.zeros(3), length=3))
+    forged.conclude()
+    assert "played again it is" in "".join(forged.checked().problems)
+
+
+def test_a_changed_state_is_caught_though_the_recording_is_hashed_again(forged: Forgery):
+    file = forged.seed / "recordings" / "test-0000.rrd"
+    told = recording.read(file)
+    states = told.episode.states.copy()
+    states[5, 2] += 1e-9
+    source = sources.open_source(tiny_benchmark.NAME)
+    changed = replace(told.episode, states=states)
+    recording.write(file, changed, source.path(changed.setting), told.properties)
+    assert forged.checked().problems == ["seed0: recordings/test-0000.rrd is not of the episode that its actions give"]
+
+
+def test_a_recording_under_another_name_is_caught(forged: Forgery):
+    file = forged.seed / "recordings" / "test-0000.rrd"
+    told = recording.read(file)
+    path = sources.open_source(tiny_benchmark.NAME).path(told.episode.setting)
+    recording.write(file, told.episode, path, {**told.properties, "method": "other"})
+    assert forged.checked().problems == ["seed0: recordings/test-0000.rrd says method other, not near"]
+    file.rename(file.with_name("test-0001.rrd"))
+    assert "test-0001.rrd is not of the episode" in forged.checked().problems[0]
+    file.with_name("test-0001.rrd").rename(file.with_name("test-0900.rrd"))
+    assert "test-0900.rrd is of no row of the splits" in forged.checked().problems[0]
+
+
+def test_a_damaged_recording_is_caught(forged: Forgery):
+    file = forged.seed / "recordings" / "test-0000.rrd"
+    file.write_bytes(file.read_bytes()[:-100])
+    assert "test-0000.rrd" in forged.checked().problems[0]
+
+
+def test_a_changed_setting_is_caught(forged: Forgery):
+    forged.table(row(2, offset_x=-0.015, offset_y=0.005))
+    assert "test: row 2 was played in another setting than the split's" in forged.checked().problems[0]
+
+
+def test_a_dropped_episode_is_caught(forged: Forgery):
+    forged.table(lambda table: table[table["score"] > 0])
+    forged.conclude()
+    assert "has 3 episodes where the splits have 4" in forged.checked().problems[0]
+
+
+def test_a_good_episode_twice_in_place_of_a_bad_one_is_caught(forged: Forgery):
+    def twice(table: pd.DataFrame) -> pd.DataFrame:
+        good = table[(table["split"] == "test") & (table["row"] == 0)]
+        return pd.concat([table[table["score"] > 0], good], ignore_index=True)
+
+    forged.table(twice)
+    forged.conclude()
+    problems = forged.checked().problems
+    assert "test: row 0 is there 2 times" in problems[0]
+    assert "test: row 2 is missing" in problems[1]
+    forged.table(lambda table: table.assign(row=[0, 1, 0, 2]))
+    assert "row 2 was played in another setting" in "".join(forged.checked().problems)
+
+
+def test_swapped_splits_are_caught(forged: Forgery):
+    names = {"test": "unseen-reach", "unseen-reach": "test"}
+    forged.table(lambda table: table.assign(split=table["split"].map(names)))
+    assert "was played on another version of the split" in forged.checked().problems[0]
+    forged.table(lambda table: table.assign(split="train"))
+    assert "train is none of the splits that rank methods" in forged.checked().problems[0]
+
+
+def test_an_edited_result_is_caught(forged: Forgery):
+    def better(result: dict[str, Any]) -> None:
+        result["splits"]["test"]["scores"][2] = 20.0
+
+    forged.json("seed0/result.json", better)
+    assert forged.checked().problems == [
+        "seed0: its result has scores on test that its episodes do not give (row 2: 20.0, not 0.0)"
+    ]
+    forged.json("seed0/result.json", lambda result: result.update(seed=7))
+    assert "its result says seed 7, not 0" in forged.checked().problems[0]
+    forged.json("seed0/result.json", lambda result: result.update(rank=1))
+    assert "'rank' was unexpected" in forged.checked().problems[0]
+
+
+def test_a_tier_cannot_be_claimed(forged: Forgery):
+    forged.json("seed0/result.json", lambda result: result.update(tier="re-run"))
+    verdict = forged.checked()
+    assert verdict.tier == "replayed"
+    assert "tier" not in verdict.results[0]
+
+
+def test_another_agents_episodes_are_caught_unless_the_agent_itself_does_the_same(submitted: Path, forged: Forgery):
+    """A board that has the same episodes under another name."""
+    other = json.loads((submitted / "runs/submissions/near/synthetic/seed0/result.json").read_text()) | {
+        "method": "first"
+    }
+    place = forged.board / "results" / "first" / "synthetic" / "seed0"
+    place.mkdir(parents=True)
+    (place / "result.json").write_text(json.dumps(other))
+    line = "seed0: 3 of 3 episodes on test have the very actions of 'first', seed 0"
+    refused = forged.checked()
+    assert line in refused.problems
+    again = forged.checked(rerun=True)
+    assert again.problems == []
+    assert line in again.notes
+
+
+def test_chosen_and_hidden_seeds_are_caught(forged: Forgery):
+    forged.json("bundle.json", lambda told: told.update(seeds=[1]))
+    problems = forged.checked().problems
+    assert "has seeds [1]; they must be 0, 1, 2" in problems[0]
+    assert "seed0 is there, but not among the seeds" in problems[1]
+    forged.json("bundle.json", lambda told: told.update(seeds=[0, 1, 2]))
+    assert "seed2: lacks episodes.parquet" in forged.checked().problems[0]
+
+
+def test_other_physics_is_told(forged: Forgery):
+    forged.json("bundle.json", lambda told: told.update(physics="0" * 64))
+    assert forged.checked().problems == [
+        "was played with other physics than this version's; submit it again with this version"
+    ]
+
+
+def test_a_machine_is_of_the_same_platform_as_itself(monkeypatch: pytest.MonkeyPatch):
+    """On a Mac the name of the system has two forms."""
+    monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
+    monkeypatch.setattr("platform.system", lambda: "Darwin")
+    assert differences.same_platform(provenance.collect(""))
+    monkeypatch.setattr("platform.platform", lambda *_: "Linux-6.1-x86_64")
+    here = provenance.collect("")
+    monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
+    assert not differences.same_platform(here)
+
+
+def test_another_platform_is_held_to_outcomes_and_says_so(forged: Forgery):
+    """A last bit differs everywhere; outcomes are those of the replay."""
+    forged.json("seed0/provenance.json", lambda told: told["machine"].update(cpu="another"))
+    assert forged.checked().problems == ["seed0: its result has another provenance than its run"]
+    forged.json("seed0/result.json", lambda result: result["provenance"]["machine"].update(cpu="another"))
+    forged.table(lambda table: table.assign(trace="0" * 64))
+    verdict = forged.checked()
+    assert verdict.problems == []
+    assert "made on another platform; of 4 episodes 0 are equal bit for bit, 4 end alike" in verdict.notes[0]
+    forged.table(row(2, score=20.0, success=True))
+    assert "says success True" in "".join(forged.checked().problems)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [{"machine": "x"}, {"git": ["a"]}, {"machine": {"system": "Linux", "cpu": "\ud800", "cores": 1}}, {"more": 1}],
+)
+def test_a_provenance_from_which_no_page_could_be_made_is_refused(told: dict[str, Any], forged: Forgery):
+    forged.json("seed0/provenance.json", lambda whole: whole.update(told))
+    forged.json("seed0/result.json", lambda result: result["provenance"].update(told))
+    assert "in the result is not" in forged.checked().problems[0] or "text" in forged.checked().problems[0]

@@ -1,0 +1,97 @@
+"""The published leaderboard: what is taken over from runs, and what is made of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dextron_bench.cli import main as cli
+from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.methods import weights
+from dextron_bench.runs import run_files as records
+from dextron_bench.scores import standings as leaderboard
+from tests.helpers import tiny_benchmark, tiny_training
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A working folder in the tiny world with a run of the toy learner, two seeds, and of `nothing`."""
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(weights, "place", lambda learner, reaches: tmp_path / "beside" / learner.label / reaches)
+    common = ["--quiet", "--no-floors", "--record", "0"]
+    assert cli.main(["run", "--method", "toy_learner:Toy", "--preset", "quick", "--seed", "0", "1", *common]) == 0
+    assert cli.main(["run", "--method", "nothing", *common]) == 0
+    yield tmp_path
+    tiny_benchmark.forget()
+
+
+def build(*words: str) -> int:
+    return cli.main(["leaderboard", "build", "--into", "board", *words])
+
+
+def test_results_curves_and_weights_are_taken_over_as_they_are(here: Path):
+    assert build("--runs", "runs") == 0
+    run, published = here / "runs/toy-0.1/synthetic/seed1", here / "board/results/toy-0.1/synthetic/seed1"
+    assert sorted(file.name for file in published.iterdir()) == ["curve.json", "result.json"]
+    for name in ("curve.json", "result.json"):
+        assert (published / name).read_bytes() == (run / name).read_bytes()
+    assert (here / "beside/toy-0.1/synthetic/seed1.safetensors").read_bytes() == (run / weights.FILE).read_bytes()
+    assert [file.name for file in (here / "board/results/nothing/synthetic/seed0").iterdir()] == ["result.json"]
+
+
+def test_the_tables_are_those_of_the_results(here: Path):
+    assert build("--runs", "runs") == 0
+    rows = leaderboard.table(records.results(here / "runs"))
+    written = pd.read_csv(here / "board/table.csv")
+    assert written["method"].tolist() == rows["method"].tolist()
+    assert written["return"].to_numpy() == pytest.approx(rows["return"].to_numpy())
+    text = (here / "board/README.md").read_text()
+    row = rows[(rows["method"] == "toy-0.1") & (rows["split"] == "test")].iloc[0]
+    shown = f"{row['return']:.2f} [{row['return_low']:.2f}, {row['return_high']:.2f}], {100 * row['success']:.1f} %"
+    assert f"| {row['rank']:.0f} | `toy-0.1` | 2 | self-reported | {shown} |" in text
+    again = json.loads((here / "board/table.json").read_text())
+    assert [each["tier"] for each in again] == written["tier"].tolist()
+    assert [each["frames"] for each in again if each["method"] == "nothing"] == [None, None]
+    shares = [f"{25.0 * row[cause]:.1f}" for cause in CAUSES]  # Of two seeds' two episodes.
+    assert f"| `toy-0.1` | {' | '.join(shares)} |" in text
+    assert (here / "board/curves-synthetic.png").stat().st_size > 5000
+
+
+def test_what_a_person_wrote_stays_and_building_twice_changes_nothing(here: Path):
+    assert build("--runs", "runs") == 0
+    readme = here / "board/README.md"
+    readme.write_text(readme.read_text().replace("# Leaderboard", "# Ours\n\nBefore.") + "\nAfter.\n")
+    assert build() == 0
+    before = readme.read_text()
+    assert before.startswith("# Ours\n\nBefore.\n")
+    assert before.endswith("\nAfter.\n")
+    assert build() == 0
+    assert readme.read_text() == before
+
+
+def test_an_unfinished_run_is_not_published(here: Path, complaint: Callable[..., str]):
+    for file in (here / "runs").glob("*/*/seed*/result.json"):
+        result = json.loads(file.read_text())
+        result["splits"].pop("unseen-reach")
+        file.write_text(json.dumps(result))
+    line = complaint("leaderboard", "build", "--runs", "runs", "--into", "board")
+    assert "no run in runs holds all splits that rank methods" in line
+    assert not (here / "board").exists()
+
+
+def test_what_verification_noted_stays_while_nothing_else_changes(here: Path):
+    assert build("--runs", "runs") == 0
+    file = here / "board/results/nothing/synthetic/seed0/result.json"
+    noted = json.loads(file.read_text()) | {"tier": "re-run"}
+    file.write_text(json.dumps(noted))
+    assert build("--runs", "runs") == 0
+    assert json.loads(file.read_text())["tier"] == "re-run"
+    noted["splits"]["test"]["scores"][0] = 20.0
+    file.write_text(json.dumps(noted))
+    assert build("--runs", "runs") == 0
+    assert "tier" not in json.loads(file.read_text())

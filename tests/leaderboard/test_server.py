@@ -1,0 +1,148 @@
+"""The leaderboard's server: who is served, and what is not."""
+
+from __future__ import annotations
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from http.client import HTTPConnection, HTTPResponse
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+from dextron_bench.leaderboard import server as serving
+
+PAGE = '<a href="../recordings/a%2Bb-success.rrd">success</a>'
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[serving.Server]:
+    """A server of a folder with one recording, a link that leads out of it, and a secret beside."""
+    for folder in ("board", "recordings"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "board/index.html").write_text(PAGE)
+    (tmp_path / "recordings/a+b-success.rrd").write_bytes(b"RRF2")
+    (tmp_path / "secret.rrd").write_text("secret")
+    (tmp_path / "recordings/link.rrd").symlink_to(tmp_path / "secret.rrd")
+    (tmp_path / "recordings/notes.txt").write_text("notes")
+    with serving.Server(serving.Site(tmp_path / "board", {"index.html": ("text/html", b"viewer")}), 0) as opened:
+        thread = threading.Thread(target=opened.serve_forever, daemon=True)
+        thread.start()
+        yield opened
+        opened.shutdown()
+        thread.join()
+
+
+@pytest.fixture
+def ask(server: serving.Server) -> Callable[..., tuple[HTTPResponse, bytes]]:
+    """What the server answers; the path goes out as it is."""
+
+    def ask(path: str, method: str = "GET", host: str | None = None) -> tuple[HTTPResponse, bytes]:
+        connection = HTTPConnection(serving.LOOPBACK, server.server_port, timeout=5)
+        connection.putrequest(method, path, skip_host=True)
+        if host != "":
+            connection.putheader("Host", host or f"127.0.0.1:{server.server_port}")
+        connection.endheaders()
+        answer = connection.getresponse()
+        body = answer.read()
+        connection.close()
+        return answer, body
+
+    return ask
+
+
+def test_the_page_and_recordings_are_served(server: serving.Server, ask: Callable[..., tuple[HTTPResponse, bytes]]):
+    answer, body = ask("/")
+    assert (answer.status, answer.headers["Content-Type"]) == (200, "text/html; charset=utf-8")
+    link = re.search(r'href="/viewer/\?url=([^"]+)"', body.decode())
+    assert link
+    assert unquote(link[1]) == f"http://127.0.0.1:{server.server_port}/recordings/a%2Bb-success.rrd"
+    assert ask("/recordings/a+b-success.rrd")[1] == ask("/recordings/a%2Bb-success.rrd")[1] == b"RRF2"
+    answer, body = ask("/viewer/?url=whatever")
+    assert body == b"viewer"
+    assert "connect-src 'self'" in answer.headers["Content-Security-Policy"]
+
+
+def test_without_a_viewer_recordings_are_downloaded(
+    server: serving.Server, ask: Callable[..., tuple[HTTPResponse, bytes]]
+):
+    server.site.viewer.clear()
+    assert ask("/")[1].decode() == PAGE
+    assert ask("/viewer/")[0].status == 404
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("/recordings/../secret.rrd", "/recordings/..%2fsecret.rrd", "/recordings/%2e%2e/secret.rrd", "/secret.rrd"),
+        *("/recordings/link.rrd", "/recordings/", "/recordings", "/recordings/notes.txt", "/results/", "//secret.rrd"),
+        *("/viewer/../index.html", "/viewer/none", "/..", "http://evil.example/", "/recordings/a\x00.rrd", "*"),
+    ],
+)
+def test_nothing_else_is_served(
+    path: str, ask: Callable[..., tuple[HTTPResponse, bytes]], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(HTTPConnection, "_validate_path", lambda *_: None)
+    answer, body = ask(path)
+    assert answer.status == 404
+    assert b"secret" not in body.replace(b"secret.rrd", b"")
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "", "[::1]"])
+def test_a_page_of_another_name_is_refused(host: str, ask: Callable[..., tuple[HTTPResponse, bytes]]):
+    """A site whose name comes to mean this machine (DNS rebinding) would read along otherwise."""
+    answer, body = ask("/recordings/a+b-success.rrd", host=host)
+    assert answer.status == 403
+    assert b"RRF2" not in body
+
+
+def test_one_may_look_but_not_write(ask: Callable[..., tuple[HTTPResponse, bytes]]):
+    answer, body = ask("/", method="HEAD")
+    assert (answer.status, body) == (200, b"")
+    for method in ("POST", "PUT", "DELETE", "OPTIONS"):
+        assert ask("/", method=method)[0].status == 501
+
+
+def test_other_machines_cannot_connect(server: serving.Server):
+    assert server.server_address[0] == "127.0.0.1"
+    with socket.socket() as other:
+        other.settimeout(2)
+        assert other.connect_ex(("127.0.0.2", server.server_port)) != 0  # An address of this machine, but not bound.
+
+
+def test_a_folder_without_a_page_is_told(tmp_path: Path, complaint: Callable[..., str]):
+    line = complaint("leaderboard", "serve", "--into", str(tmp_path))
+    assert "has no index.html; `dextron-bench leaderboard build --into" in line
+
+
+SERVED = """
+import signal
+from dextron_bench.cli.main import main
+signal.signal(signal.SIGINT, signal.default_int_handler)  # Which what started the tests may have switched off.
+raise SystemExit(main(["leaderboard", "serve", "--port", "0"]))
+"""
+
+
+@pytest.mark.slow
+def test_it_serves_the_viewer_until_it_is_interrupted():
+    words = [sys.executable, "-c", SERVED]
+    root = Path(__file__).parents[2]
+    with subprocess.Popen(words, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
+        assert served.stdout
+        port = int(served.stdout.readline().strip().rpartition(":")[2].strip("/"))
+        connection = HTTPConnection(serving.LOOPBACK, port, timeout=10)
+        connection.request("GET", "/viewer/re_viewer_bg.wasm")
+        answer = connection.getresponse()
+        assert (answer.status, answer.headers["Content-Type"]) == (200, "application/wasm")
+        assert answer.read(4) == b"\0asm"
+        connection.close()
+        served.send_signal(signal.SIGINT)
+        try:
+            assert served.wait(30) == 130
+        finally:
+            served.kill()

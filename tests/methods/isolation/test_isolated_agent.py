@@ -1,0 +1,302 @@
+"""Agents in processes of their own: they act as they do here, and what they may not do or cannot is survived."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnx.helper
+import onnx.numpy_helper
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.rollout import AgentError, rollout
+from dextron_bench.experts.policies import Case
+from dextron_bench.methods.isolation import policy_files as policies
+from dextron_bench.methods.isolation import protocol as wire
+from dextron_bench.methods.isolation import sandbox
+from dextron_bench.methods.isolation.isolated_agent import Isolated, Limits, launch
+from dextron_bench.splits import loading as splits
+from tests.helpers.short_reaches import SOURCE
+from tests.helpers.tiny_benchmark import ROWS
+
+CASES: list[Case] = splits.cases(ROWS[:3])
+AGENT = """
+import numpy as np
+from dextron_bench.world import task
+
+class Agent:
+    name = "mine"
+
+    def agent(self, seed):
+        return self
+
+    def reset(self, episodes):
+        pass
+
+    def act(self, states):
+        {act}
+"""
+CLOSES = "return np.where(task.distance(states) < 0.06, 1.0, -1.0)[:, None]"
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Callable[[str], str]:
+    """Writes an agent whose `act` is some line; returns what names it."""
+
+    def made(act: str) -> str:
+        file = tmp_path / "mine.py"
+        file.write_text(AGENT.format(act=act))
+        return f"{file}:Agent"
+
+    return made
+
+
+def play(spec: str, cases: list[Case] = CASES, **limits: float) -> list[Episode]:
+    with Isolated(launch(spec), limits=Limits(**limits)) as agent:  # pyright: ignore[reportArgumentType]
+        found = dict(rollout(agent, SOURCE, cases, slots=2, threads=1))
+    return [found[index] for index in range(len(cases))]
+
+
+def test_an_isolated_agent_acts_as_it_does_here(made: Callable[[str], str]):
+    class Here:
+        def reset(self, episodes: np.ndarray) -> None: ...
+
+        def act(self, states: np.ndarray) -> np.ndarray:
+            from dextron_bench.world import task
+
+            return np.where(task.distance(states) < 0.06, 1.0, -1.0)[:, None]
+
+    here = dict(rollout(Here(), SOURCE, CASES, slots=2, threads=1))
+    for index, episode in enumerate(play(made(CLOSES))):
+        np.testing.assert_array_equal(episode.states, here[index].states)
+        np.testing.assert_array_equal(episode.actions, here[index].actions)
+        assert episode.score == here[index].score
+
+
+def test_installed_methods_and_what_agents_print(made: Callable[[str], str]):
+    assert [episode.failure for episode in play("nothing")] == [""] * 3
+    assert [episode.failure for episode in play(made(f"print('hello'); {CLOSES}"))] == [""] * 3
+
+
+def test_a_learners_file_can_be_its_agents_too(made: Callable[[str], str]):
+    (episode,) = play(
+        made("from dextron_bench.methods.learners import Track; return np.zeros((len(states), 1))"), CASES[:1]
+    )
+    assert episode.failure == ""
+
+
+@pytest.mark.parametrize(
+    ("act", "why"),
+    [
+        ("from dextron_bench.world.engine import Engine", "agents may not import dextron_bench.world.engine"),
+        ("from dextron_bench import splits", "agents may not import dextron_bench.splits"),
+        ("import mujoco", "agents may not import mujoco"),
+        ("from dextron_bench.world import model; model.load()", "'NoneType' object is not callable"),
+        ("import dextron_bench as d; open(d.__path__[0] + '/data/splits.json')", "settings and experts are not for"),
+        ("open('/etc/../root/.bashrc')", "only Python's files and their own folder are theirs"),
+        ("open(__file__, 'a')", "only the folder they are started in is theirs"),
+        ("import os; os.remove(__file__)", "agents may not change files outside the folder"),
+        ("import socket; socket.create_connection(('127.0.0.1', 9))", "agents may not use the network"),
+        ("import subprocess; subprocess.run(['ls'])", "agents may not start or signal processes"),
+        ("import os; os.kill(os.getppid(), 9)", "agents may not start or signal processes"),
+        ("import sqlite3; sqlite3.connect('file:/tmp/mine?mode=rwc', uri=True)", "agents may not open databases"),
+        (
+            "import os, dextron_bench as d; os.open(d.__path__[0] + '/data', 0)",
+            "agents may not open the folder",
+        ),
+        ("import gc; gc.get_objects()", "agents may not search the process"),
+        ("return np.ones((1, 1, 1))", "act() must return floats of shape (2, 1)"),
+        ("return np.ones((len(states), 1), int)", "it returned int64"),
+        ("import os; os._exit(7)", "it ended with code 7"),
+        ("import os, signal; signal.raise_signal(9)", "it ended with signal SIGKILL"),
+        ("return np.zeros((2, 10**9))[:, :1]", "Unable to allocate"),
+        ("open('big', 'wb').truncate(2**30)", "File too large"),
+        ("import os; os.rename(__file__, 'mine')", "agents may not change files outside the folder"),
+        ("open('a', 'w').close(); import os; os.rename('a', '/tmp/stolen')", "agents may not change files outside"),
+        ("import os; os.symlink('/etc', '/tmp/mine')", "agents may not change files outside the folder"),
+        ("import shutil, os; shutil.rmtree(os.path.dirname(__file__))", "agents may not change files outside"),
+        ("import os; os.listdir('/root')", "only Python's files and their own folder are theirs"),
+        ("import resource; resource.prlimit(1, resource.RLIMIT_CORE)", "agents may not search the process"),
+        ("raise ValueError('lost')", "ValueError: lost"),
+        ("while True: pass", "it gave no answer within 1 s"),
+    ],
+)
+def test_what_fails_or_is_forbidden_fails_its_episodes_and_is_told(act: str, why: str, made: Callable[[str], str]):
+    for episode in play(made(act), CASES[:2], answer=1.0 if "while" in act else 20.0):
+        assert episode.score == 0.0
+        assert why in episode.failure
+        assert episode.failure.endswith(" at step 0")
+
+
+@pytest.mark.skipif(not sandbox.is_here(), reason="bubblewrap is not here")
+@pytest.mark.parametrize(
+    "deed",
+    [
+        "open('{data}/splits.json').read(1)",
+        "open('{data}/experts-real.parquet', 'rb').read(1)",
+        "open('{beside}', 'w').write('x') and 0",
+        "os.listdir('{home}')",
+        "os.kill(int(open('/proc/self/stat').read().split()[3]), 0) or os.getppid() > 5",
+        "__import__('socket').create_connection(('127.0.0.1', {port}), 1)",
+        "__import__('shutil').rmtree('{package}') or 1",
+    ],
+)
+def test_the_sandbox_holds_what_the_hook_does_not(deed: str, made: Callable[[str], str], tmp_path: Path):
+    """An agent that takes the hook apart, then says by its action whether it came out."""
+    package = Path(sandbox.__file__).parents[2]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        beside = tmp_path / "beside"
+        told = {"data": package / "data", "package": package, "beside": beside, "home": Path(__file__).parent}
+        wanted = deed.format(**told, port=server.getsockname()[1])
+        act = f"""
+        from dextron_bench.methods.isolation import guard
+        guard._Guard.__call__ = lambda *_: None
+        import os
+        try:
+            got = bool({wanted})
+        except Exception:
+            got = False
+        return np.full((len(states), 1), 1.0 if got else -1.0)"""
+        (episode,) = play(made(act.strip()), CASES[:1])
+        assert episode.failure == ""
+        assert (episode.actions == -1.0).all()
+        assert not beside.exists()
+    assert (package / "data" / "splits.json").exists()
+
+
+def test_an_agent_may_write_where_it_is_started(made: Callable[[str], str]):
+    act = f"open('note', 'w').write('x'); import os; os.remove('note'); {CLOSES}"
+    assert [episode.failure for episode in play(made(act))] == [""] * 3
+
+
+def test_nan_fails_one_episode_and_a_crash_those_that_were_played(made: Callable[[str], str]):
+    """With two slots the third episode begins after the crash, in a process started again."""
+    nan = play(made("a = np.zeros((len(states), 1)); a[0] = np.nan; return a"), CASES[:2])
+    assert [episode.failure for episode in nan] == ["action is nan at step 0", ""]
+    act = "import os; os.path.exists('been') or (open('been', 'w').close(), os._exit(1)); " + CLOSES
+    first, second, third = play(made(act))
+    assert first.failure == second.failure == "it ended with code 1 at step 0"
+    assert third.failure == ""
+    assert len(third.actions) > 10
+
+
+def test_what_is_slow_in_all_is_stopped_for_good(made: Callable[[str], str]):
+    """Starting the process alone takes longer than a millisecond; with two slots the third episode comes after it."""
+    first, second, third = play(made(CLOSES), total=0.001)
+    assert first.failure == second.failure == "it has had the 0.001 s that all its answers may take at step 1"
+    assert third.failure == "it has had the 0.001 s that all its answers may take at step 0"
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("exit()", "did not start: it ended with code 0"),
+        ("print('hi', flush=True)", "where a JSON object on one line was due"),
+        ("print('{}', flush=True)", 'its first line must be {"protocol": 1}'),
+        ("print('x' * 10000, flush=True)", "its answer is longer than 4176 bytes"),
+    ],
+)
+def test_a_program_that_does_not_speak_the_protocol_is_named(tmp_path: Path, line: str, why: str):
+    (tmp_path / "agent.py").write_text(f"input()\n{line}\ninput()\n")
+    with pytest.raises(AgentError, match="the agent") as caught:
+        play(f"exec:{sys.executable} {tmp_path}/agent.py")
+    assert why in str(caught.value)
+
+
+PROGRAM = """
+import json, sys
+print(json.dumps({"protocol": json.loads(input())["protocol"]}), flush=True)
+for line in sys.stdin:
+    print(json.dumps({"actions": [0.5 for _ in json.loads(line)["states"]]}), flush=True)
+"""
+
+
+def test_a_program_in_any_language_plays(tmp_path: Path):
+    (tmp_path / "agent.py").write_text(PROGRAM)
+    for episode in play(f"exec:{sys.executable} {tmp_path}/agent.py"):
+        assert episode.failure == ""
+        assert (episode.actions == 0.5).all()
+
+
+@pytest.mark.parametrize(
+    ("spec", "why"), [("exec:agent 'x", "is no command"), ("__main__:Agent", "is no module that agents can come from")]
+)
+def test_words_that_name_no_agent_are_told(spec: str, why: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)  # As it is in a program that was begun by its file.
+    with pytest.raises(AgentError, match=why):
+        launch(spec)
+
+
+def test_an_agent_is_given_time_and_memory():
+    with pytest.raises(AgentError, match="--timeout and --memory are more than 0"):
+        Limits(memory=-1)
+
+
+def test_a_program_that_is_not_there_is_named():
+    with pytest.raises(AgentError, match=r"it ended with code 127: .*no-such-program"):
+        play("exec:no-such-program")
+
+
+def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
+    class Closes(torch.nn.Module):
+        def forward(self, states: torch.Tensor) -> torch.Tensor:
+            return torch.tanh(states[:, :1] * 0.0 + 0.25)
+
+    file = tmp_path / "policy.pt"
+    torch.jit.save(torch.jit.script(Closes()), str(file))
+    for episode in play(str(file), CASES[:1]):
+        np.testing.assert_allclose(episode.actions, np.tanh(0.25), atol=1e-7)
+    torch.save({"weights": 1}, file)
+    with pytest.raises(AgentError, match="is no TorchScript file"):
+        play(str(file))
+    with pytest.raises(policies.BadPolicy, match=r"known kinds end in \.pt, \.onnx"):
+        policies.load(tmp_path / "policy.pkl")
+
+
+def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):
+    """The policy's action is -4 times the palm's x, within [-1, 1]."""
+    states = onnx.helper.make_tensor_value_info("states", onnx.TensorProto.FLOAT, ["N", 48])
+    actions = onnx.helper.make_tensor_value_info("actions", onnx.TensorProto.FLOAT, ["N", 1])
+    choice = onnx.numpy_helper.from_array(np.eye(48, 1, -7, dtype=np.float32) * np.float32(-4.0), "choice")
+    bounds = [onnx.numpy_helper.from_array(np.array(end, np.float32), name) for name, end in (("low", -1), ("high", 1))]
+    nodes = [
+        onnx.helper.make_node("MatMul", ["states", "choice"], ["chosen"]),
+        onnx.helper.make_node("Clip", ["chosen", "low", "high"], ["actions"]),
+    ]
+    graph = onnx.helper.make_graph(nodes, "policy", [states], [actions], [choice, *bounds])
+    model = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 18)], ir_version=10)
+    file = tmp_path / "policy.onnx"
+    onnx.save(model, str(file))
+    for episode in play(str(file), CASES[:1]):
+        seen = episode.states[: len(episode.actions), 7:8].astype(np.float32)
+        expected = np.clip(np.float32(-4.0) * seen, -1.0, 1.0)
+        assert len(np.unique(expected)) > 10
+        np.testing.assert_array_equal(episode.actions, expected)
+    file.write_bytes(file.read_bytes()[:100])
+    with pytest.raises(AgentError, match="is no ONNX file that can be run"):
+        play(str(file))
+
+
+@given(st.binary(max_size=200), st.integers(1, 5))
+def test_whatever_a_process_writes_is_actions_or_a_bad_answer(line: bytes, count: int):
+    with suppress(wire.BadAnswer):
+        assert wire.actions(line, count).shape == (count, 1)
+
+
+@given(st.lists(st.floats(), min_size=1, max_size=5))
+def test_actions_come_through_bit_for_bit(actions: list[float]):
+    sent = np.array(actions)[:, None]
+    np.testing.assert_array_equal(wire.actions(wire.answer(sent), len(actions)), sent)
+    states = np.array(actions)[:, None].repeat(48, axis=1)
+    rows, found = wire.asked(wire.question([0], states))
+    assert rows.tolist() == [0]
+    np.testing.assert_array_equal(found, states)

@@ -1,0 +1,64 @@
+"""Downloads from a server of this process: whole, cut, too large, not there."""
+
+from __future__ import annotations
+
+import io
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+
+import pytest
+
+from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded import download, release
+from tests.conftest import Published
+
+
+class Server(BaseHTTPRequestHandler):
+    """Serves `content`; /cut announces more than it sends."""
+
+    content = b""
+
+    def do_GET(self):
+        self.send_response(404 if self.path == "/none" else 200)
+        self.send_header("Content-Length", str(len(self.content) + (9 if self.path == "/cut" else 0)))
+        self.end_headers()
+        self.wfile.write(self.content)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Says nothing."""
+
+
+@pytest.fixture
+def site(published: Published, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    monkeypatch.setenv("DEXTRON_CACHE", str(published.folder / "cache"))
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+    monkeypatch.setattr(Server, "content", published.zip().read_bytes())
+    server = HTTPServer(("127.0.0.1", 0), Server)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_fetch_imports_what_it_downloads(published: Published, site: str):
+    heard: list[tuple[int, int]] = []
+    manifest = release.Manifest.load(published.manifest)
+    fetched = download.fetch(manifest, lambda done, total: heard.append((done, total)), url=f"{site}/release.zip")
+    assert len(fetched) == 3 == len(archive.load_reaches(manifest))
+    assert heard[-1] == (len(Server.content), len(Server.content))
+
+
+@pytest.mark.parametrize(("page", "reason"), [("none", "the server answers 404"), ("cut", "the connection broke")])
+def test_a_download_that_fails_says_why(site: str, page: str, reason: str):
+    with pytest.raises(download.FetchError, match=reason):
+        download.download(f"{site}/{page}", io.BytesIO())
+
+
+def test_a_download_stops_at_its_limit(site: str):
+    target = io.BytesIO()
+    with pytest.raises(download.FetchError, match="has more than 100 bytes"):
+        download.download(f"{site}/release.zip", target, limit=100)
+    assert target.getvalue() == b""

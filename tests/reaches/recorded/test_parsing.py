@@ -1,0 +1,176 @@
+"""The reader of recordings: what it makes of sound files, and that it names what is wrong with others."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dextron_bench.reaches.recorded import parsing as raw
+from tests.conftest import START, Published
+
+FILE, NOTES = "extracts/01_fl_06.json", "extracts/meta/01_fl_06_meta.json"
+GOOD = [["start", 0.0], ["reached", 1.0], ["top", 2.0]]
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from(["t", "x", "q", "z"]), inner),
+    max_leaves=12,
+)
+
+
+def line(t: Any = 1.0, x: Any = (0.0, 0.0, 0.0), q: Any = (1.0, 0.0, 0.0, 0.0)) -> str:
+    return json.dumps({"t": t, "x": x, "q": q})
+
+
+def test_parse_zeroes_the_clock_and_lifts_to_the_table(published: Published):
+    reach = raw.parse("01_fl_06", published.files[FILE], published.files[NOTES])
+    np.testing.assert_allclose(reach.times, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5], atol=1e-12)
+    np.testing.assert_allclose(reach.positions[0], [-0.5, -0.2, 0.1])  # -0.1 m above a plane 0.2 m up.
+    assert reach.reached == pytest.approx(0.3)
+    assert (reach.subject, reach.ring, reach.angle) == ("01", 1, 1)
+
+
+def test_reached_counts_from_the_first_sample_not_from_the_start_annotation(published: Published):
+    notes = json.dumps([["start", START - 0.2], ["reached", START + 0.4], ["top", START + 0.5]]).encode()
+    assert raw.parse("01_fl_06", published.files[FILE], notes).reached == pytest.approx(0.4)
+
+
+def test_a_sample_sent_twice_is_one(published: Published):
+    lines = published.files[FILE].splitlines(keepends=True)
+    reach = raw.parse("01_fl_06", b"".join([*lines[:2], lines[1], *lines[2:]]), published.files[NOTES])
+    assert len(reach.times) == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "origin"), [("01_fl_01", ("01", 0, 0)), ("09_nr_04", ("09", 0, 3)), ("02_fr_13", ("02", 3, 0))]
+)
+def test_markers_run_along_angles_within_a_ring(name: str, origin: tuple[str, int, int]):
+    assert raw.origin(name) == origin
+
+
+@pytest.mark.parametrize("name", ["01_fl_17", "01_fl_00", "1_fl_01", "01_xx_01", "../01_fl_01", ""])
+def test_other_names_are_refused(name: str):
+    with pytest.raises(raw.RawError, match="SUBJECT_TRIAL_MARKER"):
+        raw.origin(name)
+
+
+@pytest.mark.parametrize(
+    ("second", "wrong"),
+    [
+        (line(t=0.5), "time goes back from 1.0 to 0.5 s"),
+        (line(x=[0.0, 0.0]), "'x' is not 3 numbers"),
+        (line(q=[1.0, 0.0, 0.0]), "'q' is not 4 numbers"),
+        (line(q=[0.0, 0.0, 0.0, 0.0]), "'q' is not of unit length"),
+        (line(x=[0.0, float("nan"), 0.0]), "'x' holds nan, not a finite number"),
+        (line(t=float("inf")), "'t' holds inf, not a finite number"),
+        (line(t=True), "'t' holds a bool, not a number"),
+        (line(x=[0.0, "1", 0.0]), "'x' holds a str, not a number"),
+        ('{"t": 1.0, "x": [0.0, 0.0, 0.0]}', "'q' is missing"),
+        (line()[:-4], "is not JSON, or is cut short"),
+        ("", "is not JSON, or is cut short"),
+        ("[1]", "is not an object with t, x and q"),
+        ("[" * 5000, "is not JSON, or is cut short"),
+    ],
+)
+def test_a_bad_sample_is_named_by_line(second: str, wrong: str):
+    with pytest.raises(raw.RawError) as caught:
+        raw.read_samples(FILE, f"{line()}\n{second}\n{line(t=2.0)}\n".encode())
+    assert str(caught.value).startswith(f"{FILE}: line 2: ")
+    assert wrong in str(caught.value)
+
+
+def test_bytes_that_are_no_text_are_named_by_line():
+    with pytest.raises(raw.RawError, match="line 2: is not UTF-8"):
+        raw.read_samples(FILE, line().encode() + b"\n\xff\xfe\n")
+
+
+def test_an_empty_file_is_an_error():
+    with pytest.raises(raw.RawError, match="line 1: the file is empty"):
+        raw.read_samples(FILE, b"")
+
+
+@pytest.mark.parametrize(
+    ("notes", "wrong"),
+    [
+        (GOOD[:2], "annotation 'top' is missing"),
+        ([GOOD[0], *GOOD], "annotation 'start' is there twice"),
+        ([["start", None], *GOOD[1:]], "'start' holds a NoneType, not a number"),
+        ([["start"], *GOOD[1:]], r"entry 1 is not \[name, seconds\]"),
+        ({"start": 0.0}, "is not a list"),
+    ],
+)
+def test_bad_annotations_are_named(notes: Any, wrong: str):
+    with pytest.raises(raw.RawError, match=f"{NOTES}: line 1: .*{wrong}"):
+        raw.read_annotations(NOTES, json.dumps(notes).encode())
+
+
+def test_a_later_rest_may_be_there_twice():
+    notes = json.dumps([*GOOD, ["rest", 3.0], ["rest", 4.0]]).encode()
+    assert raw.read_annotations(NOTES, notes)["reached"] == 1.0
+
+
+def test_reached_outside_the_recording_is_an_error(published: Published):
+    notes = json.dumps([["start", START], ["reached", START + 0.6], ["top", START + 0.7]]).encode()
+    with pytest.raises(raw.RawError, match=r"'reached' is outside the recording, 0\.600 s"):
+        raw.parse("01_fl_06", published.files[FILE], notes)
+
+
+def test_too_few_samples_are_an_error(published: Published):
+    three = b"".join(published.files[FILE].splitlines(keepends=True)[:3])
+    with pytest.raises(raw.RawError, match="has 3 samples"):
+        raw.parse("01_fl_06", three, published.files[NOTES])
+
+
+@given(st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 4), min_size=1, max_size=20))
+def test_numbers_come_back_exactly(rows: list[tuple[float, float, float, float]]):
+    rows = sorted(rows)
+    text = "\n".join(line(t=t, x=x) for t, *x in rows)
+    np.testing.assert_array_equal(raw.read_samples(FILE, text.encode())[:, :4], rows)
+
+
+@given(st.lists(json_values.map(json.dumps) | st.text(max_size=20), max_size=4).map("\n".join))
+def test_any_text_is_refused_or_sound(text: str):
+    assert_refused_or_sound(text.encode())
+
+
+@settings(max_examples=200)
+@given(st.integers(0, 200), st.binary(max_size=3), st.integers(0, 3))
+def test_a_damaged_file_is_refused_or_sound(place: int, put: bytes, dropped: int):
+    content = "\n".join(line(t=float(t)) for t in range(3)).encode()
+    assert_refused_or_sound(content[:place] + put + content[place + dropped :])
+
+
+def assert_refused_or_sound(content: bytes) -> None:
+    table = None
+    with suppressed_at(f"{FILE}: line "):
+        table = raw.read_samples(FILE, content)
+    if table is None:
+        return
+    assert table.shape[1] == 8
+    assert np.all(np.isfinite(table))
+    assert np.all(np.diff(table[:, 0]) >= 0)
+
+
+@given(json_values.map(json.dumps) | st.text(max_size=30))
+def test_any_annotations_are_refused_or_sound(text: str):
+    found = None
+    with suppressed_at(f"{NOTES}: line 1: "):
+        found = raw.read_annotations(NOTES, text.encode())
+    assert found is None or set(raw.ANNOTATIONS) <= set(found)
+
+
+@contextmanager
+def suppressed_at(place: str) -> Iterator[None]:
+    """Lets a RawError pass that begins with a place; any other error is a failure."""
+    try:
+        yield
+    except raw.RawError as error:
+        if not str(error).startswith(place):
+            raise

@@ -1,0 +1,295 @@
+"""Recordings: exact, whole or not there, and honest about damage."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import stat
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rerun.chunk import Chunk, RrdReader
+
+from dextron_bench import recording
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.reaches import reach
+from dextron_bench.reaches.setting import Setting
+from dextron_bench.recording import blueprint as layout
+from dextron_bench.recording import episode_file as archive
+from dextron_bench.recording import rrd_file as storage
+from dextron_bench.recording import scene
+from dextron_bench.success.network import GRID
+from dextron_bench.world import model, task
+
+PROPERTIES: dict[str, recording.Value] = {
+    "method": "bc",
+    "seed": 3,
+    "share": 0.1,
+    "quick": False,
+    "note": "",
+    "big": 2**62,
+}
+SETTING = Setting("05_fr_05", 0.01, -0.02, 1 / 3)
+PATH = reach.Path(np.zeros((5, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)))
+
+
+def episode(steps: int, seed: int = 0, **ends: Any) -> Episode:
+    """An episode of noise about the first state, but of the right shapes."""
+    rng = np.random.default_rng(seed)
+    first = np.concatenate([model.half_closed(), np.zeros(23)])
+    states = first + rng.normal(0.0, 0.01, (steps + 1, model.STATE))
+    how = {"terminated": False, "truncated": True, **ends}
+    return Episode(SETTING, states, rng.uniform(-1, 1, (steps, 1)), np.zeros(steps), **how)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "episode.rrd"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording to be damaged in copies."""
+    file = tmp_path_factory.mktemp("whole") / "episode.rrd"
+    recording.write(file, episode(20), PATH, PROPERTIES)
+    return file
+
+
+def test_arrays_come_back_bit_for_bit(file: Path) -> None:
+    played = episode(7)
+    played.actions[:4, 0] = [np.nan, -0.0, np.inf, 5e-324]
+    played.rewards[:2] = [-np.inf, 0.1 + 0.2]
+    played.states[3, 30:33] = [-0.0, np.nan, np.inf]
+    recording.write(file, played, PATH, PROPERTIES)
+    back = recording.read(file)
+    for name in ("states", "actions", "rewards"):
+        was, now = getattr(played, name), getattr(back.episode, name)
+        assert was.tobytes() == now.tobytes()
+        assert (was.shape, was.dtype) == (now.shape, now.dtype)
+    assert back.episode.setting == SETTING
+    assert (back.episode.terminated, back.episode.truncated, back.episode.failure) == (False, True, "")
+
+
+def test_properties_come_back_with_their_types(whole: Path) -> None:
+    back = recording.read(whole).properties
+    assert back == PROPERTIES
+    assert {name: type(value) for name, value in back.items()} == {n: type(v) for n, v in PROPERTIES.items()}
+
+
+def test_a_failed_agent_keeps_its_reason_and_scores_nothing(file: Path) -> None:
+    played = episode(3, truncated=False, failure="action is nan at step 3")
+    recording.write(file, played, PATH, {})
+    back = recording.read(file)
+    assert back.episode.failure == "action is nan at step 3"
+    assert back.properties == {}
+
+
+def test_equal_episodes_have_equal_digests_in_unequal_files(tmp_path: Path) -> None:
+    def digest(name: str, seed: int) -> str:
+        recording.write(tmp_path / name, episode(4, seed), PATH, PROPERTIES)
+        return RrdReader(tmp_path / name).recordings()[0].recording_id
+
+    assert digest("a.rrd", 0) == digest("b.rrd", 0) != digest("c.rrd", 1)
+
+
+def test_sha256_is_that_of_the_file(file: Path) -> None:
+    sha256 = recording.write(file, episode(2), PATH, {})
+    assert recording.read(file, sha256).episode.setting == SETTING
+    with pytest.raises(recording.BrokenRecording, match="SHA-256"):
+        recording.read(file, "0" * 64)
+
+
+def test_one_flipped_byte_of_the_states_is_noticed(whole: Path, file: Path) -> None:
+    content = bytearray(whole.read_bytes())
+    at = content.index(recording.read(whole).episode.states[11, 20].tobytes())
+    content[at] ^= 1
+    file.write_bytes(content)
+    with pytest.raises(recording.BrokenRecording, match=r"episode\.rrd: its content does not match its digest"):
+        recording.read(file)
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(share=st.floats(0.0, 1.0, exclude_max=True))
+def test_a_recording_cut_anywhere_is_noticed(whole: Path, file: Path, share: float) -> None:
+    content = whole.read_bytes()
+    file.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(recording.BrokenRecording, match="is cut short, damaged, or no"):
+        recording.read(file)
+
+
+def test_what_is_no_recording_is_named(file: Path) -> None:
+    with pytest.raises(recording.BrokenRecording, match="there is no such file"):
+        recording.read(file)
+    file.write_text("reach,return\n")
+    with pytest.raises(recording.BrokenRecording, match=r"no \.rrd file"):
+        recording.read(file)
+
+
+def test_a_recording_of_something_else_is_named(file: Path) -> None:
+    storage.save(file, layout.lines(), "other", layout.blueprint())
+    with pytest.raises(recording.BrokenRecording, match="no digest"):
+        recording.read(file)
+
+
+def chunks_of(file: Path) -> list[Chunk]:
+    return RrdReader(file).store().stream().to_chunks()
+
+
+def forge(file: Path, chunks: list[Chunk]) -> None:
+    """Writes chunks with the digest that they need."""
+    identity = archive.digest(archive.lines(chunks))
+    digest = Chunk.from_property("digest", rr.AnyValues(sha256=identity))
+    storage.save(file, [*chunks, digest], identity, layout.blueprint())
+
+
+def test_states_of_uneven_length_make_no_episode(whole: Path, file: Path) -> None:
+    kept = [each for each in chunks_of(whole) if each.entity_path not in ("/__properties/digest", "/episode/states")]
+    uneven = rr.Scalars.columns(scalars=np.zeros(7)).partition([3, 4])
+    forge(file, [*kept, Chunk.from_columns("/episode/states", scene.timelines(0, 1), uneven)])
+    with pytest.raises(recording.BrokenRecording, match="holds arrays that make no episode"):
+        recording.read(file)
+
+
+def test_a_recording_without_a_fact_is_one_of_another_version(whole: Path, file: Path) -> None:
+    """Its digest is right, so that nobody damaged it."""
+    forge(file, [chunk for chunk in chunks_of(whole) if not chunk.entity_path.startswith("/__properties")])
+    with pytest.raises(recording.BrokenRecording, match="of another version of dextron-bench: it lacks 'reach'"):
+        recording.read(file)
+
+
+def test_a_write_that_fails_leaves_what_was_there(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recording.write(file, episode(2), PATH, {})
+    before = file.read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(recording.UnwritableRecording, match=r"cannot write recording .*episode\.rrd: No space left"):
+        recording.write(file, episode(3), PATH, {})
+    assert file.read_bytes() == before
+    assert os.listdir(file.parent) == [file.name]
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from typing import Any
+sys.path.insert(0, sys.argv[1])
+from tests.recording import test_episode_file as here
+os.fsync = lambda file: os.kill(os.getpid(), signal.SIGKILL)
+here.recording.write(Path(sys.argv[2]), here.episode(3), here.PATH, {})
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_writer_leaves_nothing_that_looks_whole(file: Path) -> None:
+    ended = subprocess.run([sys.executable, "-c", KILLED, str(Path(__file__).parents[2]), str(file)], check=False)
+    assert ended.returncode == -signal.SIGKILL
+    assert not file.exists()
+    assert list(file.parent.glob("*.rrd")) == []
+
+
+def test_a_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(recording.UnwritableRecording) as caught:
+        recording.write(tmp_path / "taken" / "episode.rrd", episode(2), PATH, {})
+    assert "taken" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_leave_is_one_line(tmp_path: Path) -> None:
+    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    with pytest.raises(recording.UnwritableRecording, match="Permission denied"):
+        recording.write(tmp_path / "episode.rrd", episode(2), PATH, {})
+
+
+def test_other_layouts_are_those_of_other_applications(tmp_path: Path) -> None:
+    """The viewer has one layout an application: that of the last file it was given."""
+    files = [tmp_path / name for name in ("plain.rrd", "foretold.rrd", "pair.rrd")]
+    recording.write(files[0], episode(2), PATH, {})
+    recording.write(files[1], episode(2), PATH, {}, Insight(GRID, np.full((2, 51), 0.5), np.zeros(2), np.zeros(2), 2.0))
+    recording.pair(files[2], *files[:2])
+    found = [RrdReader(file).recordings()[0].application_id for file in files]
+    assert found == ["dextron-bench-plain", "dextron-bench", "dextron-bench-pairs"]
+    assert [summary.damage for summary in recording.summarise(files, whole=True)] == ["", "", ""]
+
+
+def test_it_opens_with_its_own_layout(whole: Path) -> None:
+    """The viewer arranges a file by itself, and badly, if it is not told which blueprint to open with."""
+    printed = subprocess.run(
+        [sys.executable, "-m", "rerun", "rrd", "print", str(whole)], capture_output=True, text=True, check=True
+    )
+    told = re.findall(r'BlueprintActivationCommand\(.*"(.+)"\), make_active: false, make_default: true', printed.stdout)
+    [layout_of] = RrdReader(whole).blueprints()
+    assert told == [layout_of.recording_id]
+    views = [str(each.entity_path) for each in RrdReader(whole).stream(store=layout_of).to_chunks()]
+    assert sum(path.startswith("/view/") and path.count("/") == 2 for path in views) == 1 + 1 + len(layout.PLOTS)
+
+
+def test_rerun_switched_off_is_an_error_and_not_an_empty_file(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RERUN", "off")
+    with pytest.raises(recording.UnwritableRecording, match="RERUN"):
+        recording.write(file, episode(2), PATH, {})
+    assert os.listdir(file.parent) == []
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted where Linux tells of them")
+def test_recordings_leave_no_threads_behind(file: Path) -> None:
+    counted = []
+    for _ in range(3):
+        recording.write(file, episode(2), PATH, {})
+        counted.append(len(os.listdir("/proc/self/task")))
+    assert counted[0] == counted[1] == counted[2]
+
+
+@pytest.mark.parametrize("broken", ["states", "actions", "rewards"])
+def test_arrays_that_make_no_episode_are_refused(file: Path, broken: str) -> None:
+    arrays = {name: getattr(episode(3), name) for name in ("states", "actions", "rewards")}
+    arrays[broken] = arrays[broken].astype(np.float32)
+    with pytest.raises(ValueError, match=f"{broken} of 3 steps must be float64"):
+        recording.write(file, Episode(SETTING, **arrays, terminated=False, truncated=True), PATH, {})
+
+
+def test_a_recording_of_150_steps_stays_under_600_kb(file: Path) -> None:
+    recording.write(file, episode(150), PATH, PROPERTIES)
+    assert file.stat().st_size < 500_000
+
+
+@pytest.mark.parametrize(
+    ("rewards", "ends", "told"),
+    [
+        (np.ones(20), {}, "success"),
+        (np.ones(17), {}, "held too briefly"),
+        (np.zeros(3), {}, "not lifted"),
+        (np.zeros(3), {"terminated": True, "truncated": False}, "bottle fell"),
+        (np.ones(20), {"truncated": False, "failure": "action is nan"}, "agent failed"),
+    ],
+)
+def test_the_outcome_is_told_in_words(rewards: np.ndarray, ends: dict[str, Any], told: str) -> None:
+    played = episode(len(rewards), **ends)
+    played.rewards[:] = rewards
+    assert layout.outcome(played) == told
+
+
+def test_plots_show_distance_and_height_in_metres(whole: Path) -> None:
+    states = recording.read(whole).episode.states
+    chunk = next(chunk for chunk in layout.signals(states) if chunk.entity_path == "/signals/metres")
+    values = np.array(chunk.to_record_batch().column("Scalars:scalars").to_pylist())
+    np.testing.assert_array_equal(values[:, 0], task.distance(states))
+    np.testing.assert_array_equal(values[:, 1], states[:, 2])
+
+
+def test_a_missing_recording_is_not_opened(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="there is no recording"):
+        recording.view([tmp_path / "none.rrd"])

@@ -1,0 +1,105 @@
+"""Recordings as other files: tables hold every number exactly, under its name, and nothing is left half written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pandas as pd
+import pytest
+
+from dextron_bench import recording
+from dextron_bench.recording import export as conversion
+from dextron_bench.recording import film
+from dextron_bench.recording.export import UnknownEnding
+from dextron_bench.recording.film import Look
+from dextron_bench.world import model
+from dextron_bench.world.rendering import renderer as appearance
+from tests.recording.test_episode_file import PATH, episode
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("recorded") / "episode.rrd"
+    played = episode(4)
+    played.rewards[-1] = 1.0
+    recording.write(file, played, PATH, {})
+    return file
+
+
+def test_every_number_of_a_state_has_the_name_of_what_it_is():
+    compiled, names = model.load(), model.state_names()
+    assert len(set(names)) == len(names) == model.STATE
+    for joint in range(compiled.njnt):
+        called = compiled.joint(joint).name
+        free = compiled.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+        assert names[compiled.jnt_qposadr[joint]] == (f"{called}_x" if free else called)
+        assert names[25 + compiled.jnt_dofadr[joint]] == f"{called}_{'vx' if free else 'velocity'}"
+    assert names[model.BOTTLE_QUATERNION] == ("bottle_qw", "bottle_qx", "bottle_qy", "bottle_qz")
+    assert names[model.PALM_POSITION] == ("palm_x", "palm_y", "palm_z")
+    assert names[25:31] == ("bottle_vx", "bottle_vy", "bottle_vz", "bottle_wx", "bottle_wy", "bottle_wz")
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet", ".CSV"])
+def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, ending: str):
+    file = tmp_path / "new" / f"episode{ending}"
+    conversion.export(recorded, file, Look())
+    table = pd.read_parquet(file) if ending == ".parquet" else pd.read_csv(file)
+    played = recording.read(recorded).episode
+    assert list(table.columns) == ["step", "seconds", *model.state_names(), "action", "reward"]
+    assert table["step"].tolist() == [0, 1, 2, 3, 4]
+    assert table["seconds"].tolist() == [0.0, 0.02, 0.04, 0.06, 0.08]
+    np.testing.assert_array_equal(table[list(model.state_names())].to_numpy(), played.states)
+    np.testing.assert_array_equal(table["action"], [*played.actions[:, 0], np.nan])
+    np.testing.assert_array_equal(table["reward"], [0.0, 0.0, 0.0, 1.0, np.nan])
+    assert os.listdir(file.parent) == [file.name]
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".gif"])
+def test_a_film_is_written_by_its_ending(recorded: Path, tmp_path: Path, ending: str):
+    told, file = [], tmp_path / f"film{ending}"
+    conversion.export(recorded, file, Look(64, 48), lambda *parts: told.append(parts))
+    assert told[-1] == ((5, 5) if ending == ".mp4" else (3, 3))
+    assert file.read_bytes()[:12].startswith(b"GIF89a" if ending == ".gif" else b"\x00\x00\x00")
+    assert os.listdir(tmp_path) == [file.name]
+
+
+def test_an_unknown_ending_names_the_known_before_anything_is_read(tmp_path: Path):
+    for name in ("film.avi", "film"):
+        with pytest.raises(
+            UnknownEnding, match=r"film.*: cannot export to .*; choose from \.mp4, \.gif, \.csv, \.parquet"
+        ):
+            conversion.export(tmp_path / "none.rrd", tmp_path / name, Look())
+
+
+def test_what_fails_half_way_leaves_what_was_there(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    file = tmp_path / "film.gif"
+    file.write_text("before")
+
+    def full(part: Path, *_: object) -> None:
+        part.write_bytes(b"GIF89a")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(conversion.FILMS, ".gif", full)
+    with pytest.raises(OSError, match="No space left"):
+        conversion.export(recorded, file, Look())
+    assert (file.read_text(), os.listdir(tmp_path)) == ("before", ["film.gif"])
+
+
+def test_a_damaged_recording_is_not_exported(recorded: Path, tmp_path: Path):
+    cut = tmp_path / "cut.rrd"
+    cut.write_bytes(recorded.read_bytes()[:-20])
+    with pytest.raises(recording.BrokenRecording, match=r"cut\.rrd: is cut short"):
+        conversion.export(cut, tmp_path / "film.csv", Look())
+    assert os.listdir(tmp_path) == ["cut.rrd"]
+
+
+def test_the_pictures_of_a_film_are_those_of_stills():
+    states = episode(1).states
+    with appearance.Painter(32, 24, supersampling=2) as painter:
+        expected = painter.paint(states[0], appearance.CAMERAS["side"])
+    np.testing.assert_array_equal(appearance.frames(states, 32, 24)[0], expected)
+    coarse = next(iter(film._pictures(states, Look(32, 24))))
+    assert np.abs(coarse.astype(int) - expected).mean() < 5.0

@@ -1,0 +1,79 @@
+"""The published leaderboard is what the package computes: its results, its tables, and the weights that ship."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import baselines
+from dextron_bench.cli import main as cli
+from dextron_bench.evaluation import rollout
+from dextron_bench.methods import registry as methods
+from dextron_bench.methods import weights
+from dextron_bench.methods.learners import Learner
+from dextron_bench.reaches.setting import Source
+from dextron_bench.runs import run_files as records
+from dextron_bench.splits import loading as splits
+from dextron_bench.storage import atomic, tensors
+from dextron_bench.training import jobs as lessons
+
+BOARD = Path(__file__).parents[2] / "leaderboard"
+RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))
+WEIGHTS = sorted((Path(baselines.__file__).parent / "weights").glob("*/*/seed*.safetensors"))
+
+
+def name(file: Path) -> str:
+    """Method, source of reaches and seed of a file, as a folder of runs has them."""
+    return "/".join([*file.parts[-4:-1]] if file.name == records.RESULT else [*file.parts[-3:-1], file.stem])
+
+
+@pytest.mark.parametrize("file", RESULTS, ids=name)
+def test_a_result_is_whole_and_of_the_splits_that_ship(file: Path):
+    result = records.read_result(file)
+    assert name(file) == f"{result['method']}/{result['reaches']}/seed{result['seed']}"
+    for wanted in splits.evaluated(result["reaches"]):
+        split, found = splits.load(result["reaches"], wanted), result["splits"][wanted]
+        assert found["digest"] == split.digest
+        assert len(found["scores"]) == sum(found["causes"].values()) == len(split.cases)
+        assert found["causes"].get("solved", 0) == found["scores"].count(20.0)
+        assert found["failed"] == 0
+
+
+def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
+    again = tmp_path / "board"
+    shutil.copytree(BOARD, again)
+    (tmp_path / "recordings").symlink_to(BOARD.parent / "recordings")
+    assert cli.main(["leaderboard", "build", "--into", str(again)]) == 0
+    for made in ("README.md", "table.csv", "table.json", "index.html"):
+        assert (again / made).read_text() == (BOARD / made).read_text()
+    assert {file.name for file in again.glob("*.png")} == {file.name for file in BOARD.glob("*.png")}
+
+
+@pytest.mark.parametrize("file", WEIGHTS, ids=name)
+def test_weights_that_ship_are_those_of_the_result(file: Path):
+    result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
+    assert result["training"].items() >= weights.about(file).items()
+    points = atomic.read_json(BOARD / "results" / name(file) / lessons.CURVE)["points"]
+    assert result["training"]["best_epoch"] in [point["epoch"] for point in points]
+
+
+@pytest.mark.parametrize(
+    ("file", "rows"),
+    [
+        *(pytest.param(file, 2, id=f"{name(file)}-2") for file in WEIGHTS if file.stem == "seed0"),
+        *(pytest.param(file, 50, id=f"{name(file)}-50", marks=pytest.mark.slow) for file in WEIGHTS),
+    ],
+)
+def test_weights_that_ship_score_what_was_published(file: Path, rows: int, opened: Callable[[str], Source]):
+    """Bit for bit, so the sums of rewards are equal; `dextron-bench eval` does the same for every row."""
+    about, reaches = tensors.read_about(file), file.parent.name
+    learner = methods.create(about["method"], about["settings"])
+    assert isinstance(learner, Learner)
+    split = splits.load(reaches, "test")
+    agent, source = weights.agent(learner, file), opened(reaches)
+    found = {index: each.score for index, each in rollout.rollout(agent, source, split.cases[:rows])}
+    result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
+    assert [found[row] for row in range(rows)] == result["splits"]["test"]["scores"][:rows]

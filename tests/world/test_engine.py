@@ -1,0 +1,119 @@
+"""Equal settings and actions give bit-equal episodes, wherever on whichever engine they are played."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dextron_bench.reaches.reach import PALM_AHEAD
+from dextron_bench.world import model, task
+from dextron_bench.world.engine import Engine
+from tests.helpers.short_reaches import SETTINGS, SOURCE, Played, actions, played
+
+
+def play(engine: Engine, queue: list[int], slots: np.ndarray) -> dict[int, Played]:
+    """Plays the settings of a queue in some slots of an engine, each slot refilled as it falls free."""
+    queue, done = list(queue), {}
+    holds: dict[int, int] = {}
+    states: dict[int, list[np.ndarray]] = {}
+    rewards: dict[int, list[float]] = {}
+    while queue or holds:
+        free = [slot for slot in slots.tolist() if slot not in holds][: len(queue)]
+        if free:
+            holds |= {slot: queue.pop(0) for slot in free}
+            first = engine.begin(np.array(free), [SOURCE.path(SETTINGS[holds[slot]]) for slot in free])
+            states |= {slot: [row] for slot, row in zip(free, first, strict=True)}
+            rewards |= {slot: [] for slot in free}
+        live = np.array(list(holds))
+        step = engine.step(live, np.array([actions(holds[slot])[len(rewards[slot])] for slot in holds]))
+        for i, slot in enumerate(live.tolist()):
+            states[slot].append(step.states[i])
+            rewards[slot].append(step.rewards[i])
+            if step.ended[i]:
+                ends = bool(step.terminated[i]), bool(step.truncated[i])
+                done[holds.pop(slot)] = Played(np.array(states[slot]), np.array(rewards[slot]), *ends)
+    return done
+
+
+def assert_bit_equal(one: Played, other: Played) -> None:
+    """Every bit of two episodes agrees."""
+    assert one.states.tobytes() == other.states.tobytes()
+    assert one.rewards.tobytes() == other.rewards.tobytes()
+    assert (one.terminated, one.truncated) == (other.terminated, other.truncated)
+
+
+def test_the_episodes_compared_below_lift_drop_and_knock_over():
+    ends = [(played(k).rewards.sum(), played(k).terminated) for k in range(len(SETTINGS))]
+    assert task.SUCCESS in [score for score, _ in ends]
+    assert {terminated for _, terminated in ends} == {True, False}
+    assert any(0 < score < task.SUCCESS for score, _ in ends)
+
+
+@pytest.mark.parametrize(
+    ("slots", "used", "threads"),
+    [(1, [0], 1), (1, [0], 2), (7, [6, 0, 3], 1), (7, [2, 5], 2), (256, [255, 7, 128, 64, 13], 2)],
+)
+def test_slot_number_of_slots_threads_and_order_change_no_bit(slots: int, used: list[int], threads: int):
+    order = [3, 2, 0, 4, 1]
+    done = play(Engine(slots, threads), order, np.array(used))
+    assert sorted(done) == sorted(order)
+    for k in order:
+        assert_bit_equal(done[k], played(k))
+
+
+def test_a_refilled_slot_keeps_nothing_of_other_episodes():
+    engine, slot = Engine(1, threads=1), np.array([0])
+    for before in (0, 2):
+        engine.begin(slot, [SOURCE.path(SETTINGS[before])])
+        for action in actions(before)[:70]:
+            engine.step(slot, action[None])
+        assert_bit_equal(play(engine, [3], slot)[3], played(3))
+
+
+def test_a_fork_goes_on_as_its_original_would_and_leaves_it_alone():
+    engine, here, there = Engine(3, threads=2), np.array([1]), np.array([2])
+    engine.begin(there, [SOURCE.path(SETTINGS[4])])
+    engine.begin(here, [SOURCE.path(SETTINGS[3])])
+    for action in actions(3)[:65]:
+        engine.step(here, action[None])
+    engine.fork(here, there)
+    for action, state, reward in zip(actions(3)[65:], played(3).states[66:], played(3).rewards[65:], strict=False):
+        engine.step(there, np.array([[-1.0]]))
+        step = engine.step(here, action[None])
+        assert step.states[0].tobytes() == state.tobytes()
+        assert step.rewards[0] == reward
+        engine.fork(here, there)
+
+
+def test_a_fork_taken_in_contact_replays_the_rest():
+    engine, both = Engine(2, threads=2), np.array([0, 1])
+    engine.begin(both[:1], [SOURCE.path(SETTINGS[3])])
+    for action in actions(3)[:90]:
+        engine.step(both[:1], action[None])
+    engine.fork(both[:1], both[1:])
+    ended = np.zeros(2, bool)
+    for action, state in zip(actions(3)[90:], played(3).states[91:], strict=False):
+        step = engine.step(both, np.stack([action, action]))
+        assert step.states[0].tobytes() == state.tobytes() == step.states[1].tobytes()
+        ended = step.ended
+    assert ended.all()
+
+
+def test_an_episode_begins_at_rest_half_closed_behind_the_carrier():
+    path = SOURCE.path(SETTINGS[0])
+    state = Engine(2, threads=1).begin(np.array([1]), [path])[0]
+    np.testing.assert_array_equal(state[model.PALM_POSITION], path.positions[0] + PALM_AHEAD)
+    np.testing.assert_array_equal(state[model.PALM_QUATERNION], path.quaternions[0])
+    np.testing.assert_array_equal(state[model.BOTTLE_POSITION], [0.0, 0.0, 0.125])
+    np.testing.assert_array_equal(state[25:], 0.0)
+    assert task.closure(state[None])[0] == 0.5
+
+
+def test_states_are_copies():
+    engine, slot = Engine(1, threads=1), np.array([0])
+    first = engine.begin(slot, [SOURCE.path(SETTINGS[0])])
+    kept = first.copy()
+    step = engine.step(slot, np.array([[1.0]]))
+    np.testing.assert_array_equal(first, kept)
+    step.states[:] = 7.0
+    assert engine.states(slot)[0, 2] != 7.0

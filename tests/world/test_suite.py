@@ -1,0 +1,144 @@
+"""The dm_control face: the contract of an environment, and bits equal to the engine's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import dm_env
+import numpy as np
+import pytest
+from dm_control.rl import control
+
+from dextron_bench.reaches.sources import UnknownSource
+from dextron_bench.world import model, suite
+from dextron_bench.world.environment import ActionError
+from tests.helpers.short_reaches import SETTINGS, SOURCE, actions, played
+
+
+def episode(env: control.Environment, rng: np.random.Generator) -> Iterator[dm_env.TimeStep]:
+    """The time steps of one episode of random actions."""
+    step = env.reset()
+    yield step
+    while not step.last():
+        step = env.step(rng.uniform(-1.0, 1.0, 1))
+        yield step
+
+
+def observed(env: control.Environment) -> np.ndarray:
+    """The states (T, 48) of one episode of the same random actions each time."""
+    return np.array([step.observation["state"] for step in episode(env, np.random.default_rng(5))])
+
+
+@pytest.fixture
+def env() -> control.Environment:
+    """An environment that draws from the made-up source."""
+    return suite.load(SOURCE, seed=1)
+
+
+def test_specs_are_48_numbers_and_one_speed(env: control.Environment):
+    assert list(env.observation_spec()) == ["state"]
+    assert env.observation_spec()["state"].shape == (model.STATE,)
+    action = env.action_spec()
+    assert (action.shape, action.minimum, action.maximum) == ((1,), -1.0, 1.0)
+    assert env.control_timestep() == pytest.approx(0.02)
+
+
+def test_every_step_of_an_episode_meets_the_specs(env: control.Environment):
+    steps = list(episode(env, np.random.default_rng(0)))
+    for step in steps:
+        env.observation_spec()["state"].validate(step.observation["state"])
+        assert np.isfinite(step.observation["state"]).all()
+    assert steps[0].first()
+    assert steps[0].reward is None
+    assert steps[0].discount is None
+    assert all(step.mid() and step.discount == 1.0 for step in steps[1:-1])
+    assert all(step.reward in (0.0, 1.0) for step in steps[1:])
+    assert steps[-1].discount in (0.0, 1.0)
+
+
+def test_after_the_last_step_any_action_begins_an_episode(env: control.Environment):
+    list(episode(env, np.random.default_rng(0)))
+    assert env.step(np.zeros(1)).first()
+    assert env.step(np.zeros(1)).mid()
+
+
+def test_a_fresh_environment_begins_at_its_first_step():
+    assert suite.load(SOURCE, seed=1).step(np.zeros(1)).first()
+
+
+def test_equal_seeds_agree_and_others_do_not():
+    one, same, other = (suite.load(SOURCE, seed=seed) for seed in (3, 3, 4))
+    assert observed(one).tobytes() == observed(same).tobytes()
+    assert one.task.setting == same.task.setting  # pyright: ignore[reportAttributeAccessIssue]
+    assert one.reset().observation["state"].tobytes() != other.reset().observation["state"].tobytes()
+
+
+def test_a_reset_leaves_nothing_behind():
+    env = suite.load(SOURCE, [SETTINGS[3]])
+    first = observed(env)
+    env.reset()
+    for _ in range(30):
+        env.step(np.ones(1))
+    env.physics.data.qfrc_applied[:] = 1.0
+    env.physics.data.qacc_warmstart[:] = 9.0
+    assert observed(env).tobytes() == first.tobytes()
+
+
+def test_a_reset_leaves_the_shared_start_pose_alone(env: control.Environment):
+    before = model.half_closed().copy()
+    env.reset()
+    np.testing.assert_array_equal(model.half_closed(), before)
+
+
+def test_observing_changes_no_physics(env: control.Environment):
+    env.reset()
+    env.step(np.ones(1))
+    before = env.physics.get_state()
+    env.task.get_observation(env.physics)
+    env.task.get_reward(env.physics)
+    env.task.get_termination(env.physics)
+    np.testing.assert_array_equal(env.physics.get_state(), before)
+
+
+def test_what_it_returned_does_not_change_later(env: control.Environment):
+    step = env.reset()
+    kept = step.observation["state"].copy()
+    env.step(np.ones(1))
+    np.testing.assert_array_equal(step.observation["state"], kept)
+
+
+def test_no_bit_differs_from_the_engine_over_whole_episodes():
+    env = suite.load(SOURCE, SETTINGS)
+    for k, setting in enumerate(SETTINGS):
+        step, reference = env.reset(), played(k)
+        assert env.task.setting == setting  # pyright: ignore[reportAttributeAccessIssue]
+        assert step.observation["state"].tobytes() == reference.states[0].tobytes()
+        for t, reward in enumerate(reference.rewards):
+            step = env.step(actions(k)[t])
+            assert step.observation["state"].tobytes() == reference.states[t + 1].tobytes()
+            assert step.reward == reward
+            assert step.last() == (t == len(reference.rewards) - 1)
+        assert step.discount == (0.0 if reference.terminated else 1.0)
+
+
+def test_settings_are_played_over_and_over():
+    env = suite.load(SOURCE, SETTINGS[:2])
+    names = []
+    for _ in range(4):
+        env.reset()
+        names.append(env.task.setting)  # pyright: ignore[reportAttributeAccessIssue]
+    assert names == [*SETTINGS[:2], *SETTINGS[:2]]
+
+
+@pytest.mark.parametrize("action", [[np.nan], [1.0 + 1e-15], [-2.0], [0.0, 0.0], 0.5, ["close"]])
+def test_a_bad_action_is_refused(env: control.Environment, action: object):
+    env.reset()
+    with pytest.raises(ActionError, match=r"actions must"):
+        env.step(action)
+
+
+def test_bad_arguments_are_answered_with_the_good_ones():
+    with pytest.raises(UnknownSource, match="choose from minjerk, real, synthetic"):
+        suite.load("sintetic")
+    with pytest.raises(ValueError, match="empty list"):
+        suite.load(SOURCE, [])
