@@ -48,7 +48,7 @@ bench: $(ENVIRONMENT)
 	$(PYTHON) -m pytest -q -o addopts= tests/benchmarks --benchmark-json=.benchmarks/bench.json $(ARGS)
 	$(PYTHON) tests/benchmarks/table.py .benchmarks/bench.json docs/benchmarks.md
 
-# The documentation site, in site/. Open site/index.html, or serve the folder: python3 -m http.server -d site
+# The documentation site, in site/. To read it: python3 -m http.server -d site
 docs: $(ENVIRONMENT)
-	$(PYTHON) -c 'import material, mkdocstrings_handlers.python' || $(PYTHON) -m pip install --quiet -c constraints.txt -e '.[docs]'
+	$(PYTHON) -c 'import material, mkdocstrings_handlers.python' 2>/dev/null || $(PYTHON) -m pip install --quiet -c constraints.txt -e '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
