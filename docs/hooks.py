@@ -145,7 +145,7 @@ def page_of(target: Path) -> str | None:
         return f"{UNSEARCHED}# {target.name}\n\n```{LANGUAGES[target.suffix]}\n{code}```\n"
     if target.is_dir():
         entries = [entry for entry in sorted(target.iterdir()) if entry.suffix in (".md", *LANGUAGES)]
-        items = [f"- [{entry.name}]({target.name}/{entry.name})" for entry in entries]
+        items = [f"- [`{entry.name}`]({target.name}/{entry.name})" for entry in entries if entry.stat().st_size]
         return "\n".join([f"{UNSEARCHED}# {target.name}", "", *items, ""])
     return None
 
