@@ -47,7 +47,7 @@ class Omega:
         if not self.near >= 0.0:
             raise BadRule(f"--near is {self.near:g}; a distance is 0 or more")
 
-    def made_for(self, reaches: str) -> Self:
+    def for_source(self, reaches: str) -> Self:
         """The same, told which model it acts with on a source of reaches; raises NoModel."""
         named = replace(self, model=self.model or reaches)
         return replace(named, sha256=named.digest())

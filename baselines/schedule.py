@@ -34,7 +34,7 @@ class Scheduled:
     """What the baselines that learn have in common: a preset, which names the run and sets its schedule."""
 
     name: ClassVar[str]
-    home: ClassVar[str] = ""
+    train_source: ClassVar[str] = ""
 
     preset: Preset = "paper"
     """How long to train: hours (paper), minutes (quick), seconds (smoke)."""
@@ -70,6 +70,6 @@ class Scheduled:
         return min(least, episodes) if self.demonstrated else 0
 
     @property
-    def rehearsal(self) -> Self:
+    def timing_run(self) -> Self:
         """The shortest preset: all updates of its last epoch are made, as in those of the others."""
         return replace(self, preset="smoke")

@@ -13,4 +13,4 @@ class Sim(Rlil):
     """RLIL trained and evaluated on minimum-jerk reaches: no entrant of the tracks (paper, fig. 4a, "SIM")."""
 
     name: ClassVar[str] = "sim"
-    home: ClassVar[str] = "minjerk"
+    train_source: ClassVar[str] = "minjerk"

@@ -16,6 +16,6 @@ class Sor(Scheduled):
     name: ClassVar[str] = "sor"
 
     @property
-    def teacher(self) -> Sim:
+    def source_policy(self) -> Sim:
         """Whose policy it is."""
         return Sim(preset=self.preset)

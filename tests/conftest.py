@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
 from tests.helpers import forged_bundles
@@ -100,7 +100,7 @@ def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
     def run(*words: str) -> str:
         capsys.readouterr()
         try:
-            code = cli.main(list(words))
+            code = main.main(list(words))
         except SystemExit as ended:
             code = ended.code
         printed = capsys.readouterr()

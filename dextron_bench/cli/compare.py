@@ -48,11 +48,11 @@ class Compare:
     """Print everything as JSON, with all settings that flip."""
 
     def __call__(self) -> int:
-        from dextron_bench.runs import result_files as sides
+        from dextron_bench.runs import result_files
         from dextron_bench.scores import comparison
 
-        results = sides.find(self.a, self.runs), sides.find(self.b, self.runs)
-        found = comparison.compare(*sides.pair((self.a, self.b), results, self.split, self.reaches))
+        results = result_files.find(self.a, self.runs), result_files.find(self.b, self.runs)
+        found = comparison.compare(*comparison.align((self.a, self.b), results, self.split, self.reaches))
         if self.into is not None:
             from dextron_bench.scores import figures
 

@@ -24,11 +24,11 @@ class Import:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench.reaches.recorded import cache as archive
+        from dextron_bench.reaches.recorded import cache
 
         with progress_bar("reaches", self.quiet) as progress:
-            reaches = archive.import_release(self.source.expanduser(), progress=progress)
-        print(f"{len(reaches)} reaches imported into {archive.cache_file()}")
+            reaches = cache.import_release(self.source.expanduser(), progress=progress)
+        print(f"{len(reaches)} reaches imported into {cache.cache_file()}")
         return 0
 
 
@@ -43,12 +43,11 @@ class Fetch:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench.reaches.recorded import cache as archive
-        from dextron_bench.reaches.recorded import download
+        from dextron_bench.reaches.recorded import cache, download
 
         with progress_bar("bytes", self.quiet) as progress:
             reaches = download.fetch(progress=progress)
-        print(f"{len(reaches)} reaches imported into {archive.cache_file()}")
+        print(f"{len(reaches)} reaches imported into {cache.cache_file()}")
         return 0
 
 

@@ -45,17 +45,17 @@ class Export:
     """Print the summary as JSON."""
 
     def __call__(self) -> int:
-        from dextron_bench.evaluation import minari_export as export
+        from dextron_bench.evaluation import minari_export
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.splits import loading as splits
+        from dextron_bench.splits.loading import load_split
 
-        split = splits.load(self.reaches, self.split)
+        split = load_split(self.reaches, self.split)
         name = self.name or f"dextron/{self.reaches}-{self.split}-{'policies' if self.weights else 'experts'}-v0"
         rows = min(self.rows, len(split.cases))
-        wanted = export.Export(name, split, rows, self._players(), self.author or export.CONTRIBUTORS)
+        wanted = minari_export.Export(name, split, rows, self._players(), self.author or minari_export.CONTRIBUTORS)
         with progress_bar("episodes", self.quiet) as progress:
             found = wanted.write(open_source(self.reaches), self.into.expanduser(), self.threads, progress)
-        row = export.summary(found)
+        row = minari_export.summary(found)
         if self.json:
             print_json({"name": name, "folder": str(found), **row})
         else:
@@ -64,10 +64,13 @@ class Export:
         return 0
 
     def _players(self) -> list[Player]:
-        from dextron_bench.evaluation import minari_export as export
+        from dextron_bench.evaluation import minari_export
         from dextron_bench.experts.policies import ExpertAgent
-        from dextron_bench.methods import weights
+        from dextron_bench.methods import weights as methods_weights
 
         if not self.weights:
-            return [export.Player("expert", ExpertAgent())]
-        return [export.Player(str(file), weights.own(file), weights.about(file)) for file in self.weights]
+            return [minari_export.Player("expert", ExpertAgent())]
+        return [
+            minari_export.Player(str(file), methods_weights.own(file), methods_weights.about(file))
+            for file in self.weights
+        ]

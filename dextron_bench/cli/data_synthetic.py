@@ -40,18 +40,18 @@ class Fit:
     def __call__(self) -> int:
         from importlib.resources import files
 
-        from dextron_bench.reaches.recorded import cache as archive
-        from dextron_bench.reaches.synthetic import fitting as synthetic_fit
+        from dextron_bench.reaches.recorded import cache
+        from dextron_bench.reaches.synthetic import fitting
         from dextron_bench.storage import atomic
 
         if self.seed < 0:
             raise BadSeed(self.seed)
         shipped = files("dextron_bench").joinpath("data/synthetic-reaches.npz").read_bytes()
         with progress_bar("models fitted", self.quiet) as progress, TemporaryDirectory() as folder:
-            model = synthetic_fit.fit(archive.load_reaches(), self.seed)
+            model = fitting.fit(cache.load_reaches(), self.seed)
             progress(1, 1)
             made = Path(folder) / "model.npz"
-            synthetic_fit.save(model, made)
+            fitting.save(model, made)
             content = made.read_bytes()
         into = self.into.expanduser()
         atomic.write_atomically(into, lambda part: part.write_bytes(content))
@@ -96,13 +96,13 @@ class Likeness:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench.reaches.recorded import cache as archive
-        from dextron_bench.reaches.synthetic import two_sample as likeness
+        from dextron_bench.reaches.recorded import cache
+        from dextron_bench.reaches.synthetic import two_sample
 
         if self.seed < 0:
             raise BadSeed(self.seed)
         with progress_bar("models and classifiers", self.quiet) as progress:
-            tables = likeness.study(archive.load_reaches(), self.seed, progress)
+            tables = two_sample.study(cache.load_reaches(), self.seed, progress)
         if self.json:
             print_json({name: table.to_dict("records") for name, table in tables.items()})
         else:

@@ -14,7 +14,7 @@ from dextron_bench.cli.output import progress_bar
 from dextron_bench.cli.run import EPISODES_FAILED
 
 if TYPE_CHECKING:
-    from dextron_bench.runs.execution import Plan
+    from dextron_bench.runs.plans import Plan
 
 
 @dataclass(frozen=True)
@@ -49,34 +49,33 @@ class Eval:
     settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
-        from dextron_bench.runs import execution as run
-        from dextron_bench.runs import run_files as records
-        from dextron_bench.scores import standings as leaderboard
+        from dextron_bench.runs import execution, result_files
+        from dextron_bench.scores import standings
 
         plans = self._plans()
         runs = self.runs / "eval"
         found = []
         for plan in plans:
             with progress_bar(f"{plan.label}, seed {plan.seed}", self.quiet) as progress:
-                folder = run.execute(plan, runs, self.threads, progress)
-            found.append(records.read_result(folder / records.RESULT))
-        rows = leaderboard.table(found)
+                folder = execution.execute(plan, runs, self.threads, progress)
+            found.append(result_files.read_result(folder / result_files.RESULT))
+        rows = standings.table(found)
         print_rows(rows[rows["split"].isin(plans[0].splits)], self.json)
         return EPISODES_FAILED if rows["failed"].any() else 0
 
     def _plans(self) -> list[Plan]:
         """What to evaluate: a plan for each seed."""
-        from dextron_bench.methods import registry as methods
-        from dextron_bench.methods import weights
-        from dextron_bench.runs import execution as run
-        from dextron_bench.splits import loading as splits
+        from dextron_bench.methods import registry
+        from dextron_bench.methods import weights as methods_weights
+        from dextron_bench.runs import plans as runs_plans
+        from dextron_bench.splits.loading import ranking_splits
 
         settings = chosen(self.settings)
-        names = self.split or splits.evaluated(methods.home(methods.create(self.method, settings), self.reaches))
-        plan = run.Plan(self.method, self.reaches, names, 0, self.record, settings)
+        names = self.split or ranking_splits(registry.run_source(registry.create(self.method, settings), self.reaches))
+        plan = runs_plans.Plan(self.method, self.reaches, names, 0, self.record, settings)
         if self.weights is None:
-            return run.shipped(plan, self.seed)
+            return runs_plans.shipped(plan, self.seed)
         if len(self.seed) > 1:
-            raise weights.BadWeights("the weights of a file are those of one seed: give one --seed, or none")
-        seed = self.seed[0] if self.seed else weights.seed(self.weights)
+            raise methods_weights.BadWeights("the weights of a file are those of one seed: give one --seed, or none")
+        seed = self.seed[0] if self.seed else methods_weights.seed(self.weights)
         return [replace(plan, seed=seed, weights=self.weights)]

@@ -35,12 +35,12 @@ class Figures:
     """Threads of the simulation; 0 takes one for each processor."""
 
     def __call__(self) -> int:
-        from dextron_bench.recording import stills as pictures
+        from dextron_bench.recording import stills
 
         if min(self.rows, self.settings) < 1:
             raise NoRows("--rows and --settings are how many are drawn and played, 1 or more")
         self.into.mkdir(parents=True, exist_ok=True)
-        for file in (*self._reaches(), *self._learning(), *self._success(), *pictures.write_pictures(self.into)):
+        for file in (*self._reaches(), *self._learning(), *self._success(), *stills.write_pictures(self.into)):
             print(file)
         return 0
 
@@ -51,25 +51,24 @@ class Figures:
         from dextron_bench.experts import database
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.scores import figures
-        from dextron_bench.splits import building as partition
+        from dextron_bench.splits import building
 
         source = open_source(self.reaches)
         solved = database.shipped(self.reaches)[0].query("score == 20")
-        solved = solved.drop_duplicates(partition.SETTING).head(self.rows)
+        solved = solved.drop_duplicates(building.SETTING).head(self.rows)
         figures.start_points(source, solved, self._file("fig3a"))
         yield self._file("fig3a")
         figures.reach_paths(source, self._file("fig3b"))
         yield self._file("fig3b")
 
     def _learning(self) -> Iterator[Path]:
-        from dextron_bench.leaderboard import build as publication
-        from dextron_bench.runs import run_files as records
-        from dextron_bench.scores import figures
-        from dextron_bench.scores import standings as leaderboard
+        from dextron_bench.leaderboard import build
+        from dextron_bench.runs import result_files
+        from dextron_bench.scores import figures, standings
 
-        rows = leaderboard.table(records.results(self.results)) if self.results.exists() else None
+        rows = standings.table(result_files.results(self.results)) if self.results.exists() else None
         for name, cloned, epochs in (("fig4a", False, "epochs of 1,000 frames"), ("fig4c", True, "epochs of cloning")):
-            found = publication.learning_curves(self.results, cloned)
+            found = build.learning_curves(self.results, cloned)
             curves = {method: own for (method, reaches), own in found.items() if reaches == self.reaches}
             if curves and rows is not None:
                 own = rows[rows["reaches"] == self.reaches]
@@ -80,16 +79,15 @@ class Figures:
         from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.scores import figures
-        from dextron_bench.splits import loading as splits
-        from dextron_bench.success import exemplars as explanation
-        from dextron_bench.success import network
+        from dextron_bench.splits.loading import load_split
+        from dextron_bench.success import exemplars, network
 
         figures.success_curve(network.told(self.reaches)["curve"], self._file("fig4b"))
         yield self._file("fig4b")
         files = [file for file in weights.everything(self.reaches) if file.stem == "seed0"]
         policies = {file.parts[-3]: weights.own(file) for file in files}
-        model, cases = network.shipped(self.reaches), splits.load(self.reaches, "test").cases[: self.settings]
-        seen = explanation.foreseen(model, open_source(self.reaches), cases, policies, self.threads)
-        chosen = explanation.choose(seen)
-        figures.ridges({explanation.KINDS[kind]: each for kind, each in chosen.items()}, self._file("fig5"))
+        model, cases = network.shipped(self.reaches), load_split(self.reaches, "test").cases[: self.settings]
+        seen = exemplars.foreseen(model, open_source(self.reaches), cases, policies, self.threads)
+        chosen = exemplars.choose(seen)
+        figures.ridges({exemplars.KINDS[kind]: each for kind, each in chosen.items()}, self._file("fig5"))
         yield self._file("fig5")

@@ -28,10 +28,10 @@ class Show:
     """Print the rows as JSON."""
 
     def __call__(self) -> int:
-        from dextron_bench.runs import run_files as records
-        from dextron_bench.scores import standings as leaderboard
+        from dextron_bench.runs import result_files
+        from dextron_bench.scores import standings
 
-        rows = leaderboard.table(records.results(self.runs))
+        rows = standings.table(result_files.results(self.runs))
         print_rows(rows, self.json)
         if not self.json:
             print_endings(rows)
@@ -51,11 +51,11 @@ class Build:
     """Folder of the leaderboard."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard import build as publication
+        from dextron_bench.leaderboard import build, collect
 
         if self.runs is not None:
-            print(*publication.take(self.runs, self.into), sep="\n")
-        print(*publication.build(self.into), sep="\n")
+            print(*collect.take(self.runs, self.into), sep="\n")
+        print(*build.build(self.into), sep="\n")
         return 0
 
 
@@ -72,10 +72,10 @@ class Serve:
     """Folder of the leaderboard, beside that of its recordings."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard import server as serving
+        from dextron_bench.leaderboard import server as leaderboard_server
         from dextron_bench.recording import ViewerError, web_viewer
 
-        with serving.Server(serving.Site(self.into), self.port) as server:
+        with leaderboard_server.Server(leaderboard_server.Site(self.into), self.port) as server:
             try:
                 server.site.viewer.update(web_viewer())
             except ViewerError as error:

@@ -51,32 +51,31 @@ class Verify:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard import verify_board as board
+        from dextron_bench.leaderboard import verify_board
 
         if self.all == (self.bundle is not None):
-            raise board.NothingToVerify("name a submission, or give --all for the leaderboard's own rows")
+            raise verify_board.NothingToVerify("name a submission, or give --all for the leaderboard's own rows")
         if self.bundle is None:
             return self._board()
         with unpacked(self.bundle) as opened:
             return told(_verified(opened, self.board, self.rerun, self.threads, self.quiet))
 
     def _board(self) -> int:
-        from dextron_bench.leaderboard import build as publication
-        from dextron_bench.leaderboard import verify_board as board
+        from dextron_bench.leaderboard import build, verify_board
 
         sound = True
-        for row in board.rows(self.board, self.method, self.reaches):
+        for row in verify_board.rows(self.board, self.method, self.reaches):
             with progress_bar(row.name, self.quiet) as progress:
-                found = board.check(row, self.rows, self.threads, progress)
+                found = verify_board.check(row, self.rows, self.threads, progress)
             print(f"{row.name}: {found.done if not found.problems else 'NOT what its episodes give'}", flush=True)
             for problem in found.problems[:SHOWN]:
                 print(f"  {problem}")
             sound &= not found.problems
-            if self.stamp and board.stamp(row, found):
+            if self.stamp and verify_board.stamp(row, found):
                 print("  its tier is now `re-run`")
         if self.stamp:
-            publication.build(self.board)
-        if problems := board.pages(self.board):
+            build.build(self.board)
+        if problems := verify_board.pages(self.board):
             print("tables and page: NOT what the results give", *problems, sep="\n  ")
         else:
             print("tables and page: computed again from the results, and equal")
@@ -104,25 +103,25 @@ class Add:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard import add as merging
+        from dextron_bench.leaderboard import add
 
         with unpacked(self.bundle) as opened:
             manifest = opened[1]
-            merging.check_name(manifest["name"], manifest["reaches"], self.board, self.replace)
+            add.check_name(manifest["name"], manifest["reaches"], self.board, self.replace)
             verdict = _verified(opened, self.board, self.rerun, self.threads, self.quiet)
             code = told(verdict)
             if verdict.sound:
-                print(*merging.merge(verdict, self.board), sep="\n")
+                print(*add.merge(verdict, self.board), sep="\n")
         return code
 
 
 @contextmanager
 def unpacked(file: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
     """A bundle's folder and manifest, while they are needed."""
-    from dextron_bench.leaderboard.submission import bundle
+    from dextron_bench.leaderboard.submission import bundle as submission_bundle
 
     with TemporaryDirectory(prefix="dextron-bundle-") as folder:
-        yield Path(folder), bundle.unpack(file, Path(folder))
+        yield Path(folder), submission_bundle.unpack(file, Path(folder))
 
 
 def _verified(opened: tuple[Path, dict[str, Any]], board: Path, rerun: bool, threads: int, quiet: bool) -> Verdict:

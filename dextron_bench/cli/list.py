@@ -19,18 +19,18 @@ class List:
     """Folder of all runs."""
 
     def __call__(self) -> int:
-        from dextron_bench.methods import registry as methods
-        from dextron_bench.runs import run_files as records
-        from dextron_bench.splits import loading as splits
-        from dextron_bench.training import jobs as lessons
+        from dextron_bench.methods import registry
+        from dextron_bench.runs import result_files
+        from dextron_bench.splits.loading import all_splits, load_split
+        from dextron_bench.training import jobs
 
-        about = [(name, methods.describe(name)) for name in methods.known()]
-        found = [splits.load(*names) for names in splits.everything()]
+        about = [(name, registry.describe(name)) for name in registry.known()]
+        found = [load_split(*names) for names in all_splits()]
         rows = [(split.reaches, split.name, len(split.cases), split.digest[:8]) for split in found]
         print_table("methods", ["name", "what it is"], about)
         print_table("splits", ["reaches", "split", "rows", "version"], rows)
-        done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in records.results(self.runs)]
-        under_way = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in lessons.under_way(self.runs)]
+        done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in result_files.results(self.runs)]
+        under_way = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in jobs.under_way(self.runs)]
         if under_way:
             print_table(f"trainings in {self.runs}", ["method", "reaches", "seeds", "left"], under_way)
         print_table(f"runs in {self.runs}", ["method", "reaches", "seed", "splits"], done)

@@ -20,43 +20,43 @@ from dextron_bench.cli import (
     compare,
     data,
     data_export,
+    data_synthetic,
     doctor,
     figures,
     leaderboard,
+    leaderboard_verify,
     mc,
+    method_flags,
     new_agent,
     recordings,
+    recordings_choose,
     run,
     splits,
     submit,
     success,
+    success_eval,
     view,
 )
-from dextron_bench.cli import data_synthetic as data_model
 from dextron_bench.cli import eval as evaluation
-from dextron_bench.cli import leaderboard_verify as verification
 from dextron_bench.cli import list as listing
-from dextron_bench.cli import method_flags as settings
-from dextron_bench.cli import recordings_choose as showcase
-from dextron_bench.cli import success_eval as foretelling
 
 
-class Verb(Protocol):
+class Command(Protocol):
     """Does its work when called, and returns the exit code."""
 
     def __call__(self) -> int: ...
 
 
-Group = tuple[str, dict[str, type[Verb]]]  # What a group of verbs is about, and its verbs.
+Group = tuple[str, dict[str, type[Command]]]  # What a group of verbs is about, and its verbs.
 
-VERBS: dict[str, type[Verb] | Group] = {
+COMMANDS: dict[str, type[Command] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
     "leaderboard": (
         "The leaderboard: show that of a folder of runs; build, serve and verify the published one; add to it.",
         {
             **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
-            **{"verify": verification.Verify, "add": verification.Add},
+            **{"verify": leaderboard_verify.Verify, "add": leaderboard_verify.Add},
         },
     ),
     "new-agent": new_agent.NewAgent,
@@ -66,7 +66,7 @@ VERBS: dict[str, type[Verb] | Group] = {
     "view": view.View,
     "recordings": (
         "Recordings: list them, export one as a film or a table, choose a few of the runs'.",
-        {"list": recordings.List, "export": recordings.Export, "choose": showcase.Choose},
+        {"list": recordings.List, "export": recordings.Export, "choose": recordings_choose.Choose},
     ),
     "list": listing.List,
     "data": (
@@ -74,14 +74,14 @@ VERBS: dict[str, type[Verb] | Group] = {
         "export episodes for offline learning.",
         {
             **{"import": data.Import, "fetch": data.Fetch, "info": data.Info},
-            **{"fit": data_model.Fit, "likeness": data_model.Likeness, "export": data_export.Export},
+            **{"fit": data_synthetic.Fit, "likeness": data_synthetic.Likeness, "export": data_export.Export},
         },
     ),
     "mc": mc.MonteCarlo,
     "splits": splits.Splits,
     "success": (
         "The success model: play its data set, train it, judge it, explain episodes by it.",
-        {"data": success.Data, "train": success.Train, "eval": foretelling.Eval, "explain": foretelling.Explain},
+        {"data": success.Data, "train": success.Train, "eval": success_eval.Eval, "explain": success_eval.Explain},
     ),
     "figures": figures.Figures,
     "doctor": doctor.Doctor,
@@ -134,16 +134,16 @@ def explain(error: BaseException) -> tuple[int, str]:
     return BUG, f"unexpected {type(error).__name__}: {text}; --debug shows where, and a report would be welcome"
 
 
-def _parse(words: Sequence[str]) -> Verb:
+def _parse(words: Sequence[str]) -> Command:
     """The verb that words ask for; wrong ones end the process with a line and code 2."""
-    if words and words[0] in settings.VERBS:
-        verbs: dict[str, Any] = {**VERBS, words[0]: settings.widen(words, VERBS[words[0]])}
-        with settings.blaming(words):
+    if words and words[0] in method_flags.COMMANDS:
+        verbs: dict[str, Any] = {**COMMANDS, words[0]: method_flags.widen(words, COMMANDS[words[0]])}
+        with method_flags.as_bad_settings(words):
             return _told(verbs, words)
-    return _told(VERBS, words)
+    return _told(COMMANDS, words)
 
 
-def _told(verbs: Mapping[str, type[Verb] | Group], words: Sequence[str]) -> Verb:
+def _told(verbs: Mapping[str, type[Command] | Group], words: Sequence[str]) -> Command:
     """The verb; what is wrong with words is told in a line, where tyro has a frame of many."""
     said = io.StringIO()
     try:
@@ -152,11 +152,11 @@ def _told(verbs: Mapping[str, type[Verb] | Group], words: Sequence[str]) -> Verb
     except SystemExit as ended:
         if ended.code:
             verb = " ".join(["dextron-bench", *_named(verbs, words)])
-            print(f"dextron-bench: {settings.in_a_line(said.getvalue())}; see `{verb} --help`", file=sys.stderr)
+            print(f"dextron-bench: {method_flags.in_a_line(said.getvalue())}; see `{verb} --help`", file=sys.stderr)
         raise
 
 
-def _named(verbs: Mapping[str, type[Verb] | Group], words: Sequence[str]) -> list[str]:
+def _named(verbs: Mapping[str, type[Command] | Group], words: Sequence[str]) -> list[str]:
     """The verb that words begin with: its name, behind that of its group if it is in one."""
     if not words or words[0] not in verbs:
         return []
@@ -164,7 +164,7 @@ def _named(verbs: Mapping[str, type[Verb] | Group], words: Sequence[str]) -> lis
     return [words[0], *(_named(verb[1], words[1:]) if isinstance(verb, tuple) else ())]
 
 
-def _union(verbs: Mapping[str, type[Verb] | Group]) -> Any:
+def _union(verbs: Mapping[str, type[Command] | Group]) -> Any:
     """The table of verbs as the type that tyro makes subcommands of."""
     named: list[Any] = []
     for name, verb in verbs.items():

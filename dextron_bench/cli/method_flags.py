@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-VERBS = ("run", "eval")  # Those that take a method's settings.
+COMMANDS = ("run", "eval")  # Those that take a method's settings.
 RULE = "-"  # Divides what tyro says.
 ALL, METHOD = "--all", "--method"
 
@@ -34,26 +34,28 @@ def widen(words: Sequence[str], verb: Any) -> Any:
         return _with(verb, Length, Length)
     if spec is None or not spec:
         return verb
-    from dextron_bench.methods import registry as methods
+    from dextron_bench.methods import registry
 
-    found = methods.find(spec)
+    found = registry.find(spec)
     if not dataclasses.is_dataclass(found) or not dataclasses.fields(found):
         return verb
     own = {field.name for field in dataclasses.fields(verb)}
     if taken := [field.name for field in dataclasses.fields(found) if field.name in own]:
-        raise methods.BadSettings(f"method {spec!r} has a setting {taken[0]!r}, which is a flag of {words[0]!r} itself")
+        raise registry.BadSettings(
+            f"method {spec!r} has a setting {taken[0]!r}, which is a flag of {words[0]!r} itself"
+        )
     return _with(verb, found, found)
 
 
 @contextmanager
-def blaming(words: Sequence[str]) -> Iterator[None]:
+def as_bad_settings(words: Sequence[str]) -> Iterator[None]:
     """Makes what a method's class raises while settings are read BadSettings."""
     try:
         yield
     except Exception as error:
-        from dextron_bench.methods import registry as methods
+        from dextron_bench.methods import registry
 
-        raise methods.BadSettings(f"method {_chosen(words)!r}: {' '.join(str(error).split())}") from error
+        raise registry.BadSettings(f"method {_chosen(words)!r}: {' '.join(str(error).split())}") from error
 
 
 def in_a_line(framed: str) -> str:

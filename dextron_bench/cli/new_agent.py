@@ -19,9 +19,9 @@ class NewAgent:
     """The folder to make."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard.submission import starter as starting
+        from dextron_bench.leaderboard.submission import starter
 
-        for file in starting.begin(self.folder):
+        for file in starter.begin(self.folder):
             print(file)
         print(f"try it:    dextron-bench check {self.folder}/agent.py:MyAgent")
         print(f"score it:  dextron-bench run --method {self.folder}/agent.py:MyAgent")

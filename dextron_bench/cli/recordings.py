@@ -41,10 +41,10 @@ class List:
 
     def __call__(self) -> int:
         from dextron_bench import recording
-        from dextron_bench.runs import selection as gallery
+        from dextron_bench.runs import selection
 
-        files = gallery.recordings(self.place)
-        found = list(recording.summarise(files, self.check, gallery.hashes(files) if self.check else {}))
+        files = selection.recordings(self.place)
+        found = list(recording.summarise(files, self.check, selection.hashes(files) if self.check else {}))
         whole = [summary for summary in found if not summary.damage]
         if self.json:
             print_json([_told(summary) for summary in found])
@@ -83,12 +83,11 @@ class Export:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench.recording import export as conversion
-        from dextron_bench.recording import film
+        from dextron_bench.recording import export, film
 
         look = film.Look(self.width, self.height, self.camera, self.speed)
         with progress_bar("pictures", self.quiet) as progress:
-            conversion.export(self.file, self.into, look, progress)
+            export.export(self.file, self.into, look, progress)
         print(self.into)
         return 0
 

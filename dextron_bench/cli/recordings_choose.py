@@ -31,10 +31,10 @@ class Choose:
     """Folder of all runs."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard import highlights as showcase
+        from dextron_bench.leaderboard import highlights
 
-        chosen = showcase.choose(self.runs, self.reaches, self.split, self.rows)
-        files = showcase.make(chosen, self.into)
+        chosen = highlights.choose(self.runs, self.reaches, self.split, self.rows)
+        files = highlights.make(chosen, self.into)
         columns = ["method", "row", "score", "length", "cause"]
         cells = [
             [file.name, *row, round(file.stat().st_size / 1000)]

@@ -13,7 +13,7 @@ from dextron_bench.cli.method_flags import chosen
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from dextron_bench.runs.execution import Plan
+    from dextron_bench.runs.plans import Plan
 
 EPISODES_FAILED = 3
 
@@ -63,43 +63,44 @@ class Run:
 
     def _groups(self) -> list[list[Plan]]:
         """What to run: methods, each with its seeds."""
-        from dextron_bench.methods import registry as methods
-        from dextron_bench.runs import execution as run
-        from dextron_bench.splits import loading as splits
+        from dextron_bench.methods import registry
+        from dextron_bench.runs import plans as runs_plans
+        from dextron_bench.splits.loading import ranking_splits
 
-        asked = methods.paper(**chosen(self.settings)) if self.all else [(self.method, chosen(self.settings))]
-        plans = [run.Plan(spec, self.reaches, self.split, 0, self.record, settings) for spec, settings in asked]
-        reaches = self.reaches if self.all else plans[0].home
+        asked = registry.paper(**chosen(self.settings)) if self.all else [(self.method, chosen(self.settings))]
+        plans = [runs_plans.Plan(spec, self.reaches, self.split, 0, self.record, settings) for spec, settings in asked]
+        reaches = self.reaches if self.all else plans[0].source
         plans += [
-            run.Plan(name, reaches, self.split, 0) for name in methods.FLOORS if self.floors and name != self.method
+            runs_plans.Plan(name, reaches, self.split, 0)
+            for name in registry.FLOORS
+            if self.floors and name != self.method
         ]
-        plans = [replace(plan, splits=plan.splits or splits.evaluated(plan.home)) for plan in plans]
+        plans = [replace(plan, splits=plan.splits or ranking_splits(plan.source)) for plan in plans]
         return [[replace(plan, seed=seed) for seed in dict.fromkeys(self.seed)] for plan in plans]
 
     def _execute(self, groups: list[list[Plan]]) -> int:
-        from dextron_bench.runs import execution as run
-        from dextron_bench.runs import run_files as records
-        from dextron_bench.scores import standings as leaderboard
+        from dextron_bench.runs import execution, result_files
+        from dextron_bench.scores import standings
 
         found = []
         for plans in groups:
             with progress_bar(f"{plans[0].label}, epochs", self.quiet) as progress:
-                run.learn(plans, self.runs, self.threads, self.device, progress)
+                execution.learn(plans, self.runs, self.threads, self.device, progress)
             for plan in plans:
                 with progress_bar(f"{plan.label}, seed {plan.seed}", self.quiet) as progress:
-                    folder = run.execute(plan, self.runs, self.threads, progress)
-                found.append(records.read_result(folder / records.RESULT))
+                    folder = execution.execute(plan, self.runs, self.threads, progress)
+                found.append(result_files.read_result(folder / result_files.RESULT))
                 if plan.record and not self.json:
                     print(f"{folder}: results, provenance and recordings; open one with `dextron-bench view {folder}`")
-        rows = leaderboard.table(found)
+        rows = standings.table(found)
         rows = rows[rows["split"].isin({name for plans in groups for name in plans[0].splits})]
         print_rows(rows, self.json)
         return EPISODES_FAILED if rows["failed"].any() else 0
 
     def _foretell(self, groups: list[list[Plan]]) -> int:
-        from dextron_bench.runs.estimates import outlook
+        from dextron_bench.runs.estimates import estimate
 
-        rows = outlook(groups, self.runs, self.threads, self.device)
+        rows = estimate(groups, self.runs, self.threads, self.device)
         if self.json:
             print_json(rows)
             return 0

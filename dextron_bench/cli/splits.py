@@ -38,16 +38,16 @@ class Splits:
         return 0
 
     def _build(self) -> dict[str, dict[str, Any]]:
-        from dextron_bench.experts import database, montecarlo
+        from dextron_bench.experts import database as experts_database
+        from dextron_bench.experts import montecarlo
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.splits import building as partition
-        from dextron_bench.splits import building_minjerk as partition_minjerk
+        from dextron_bench.splits import building, building_minjerk
         from dextron_bench.world.engine import Engine
 
         engine = Engine(montecarlo.SLOTS, self.threads)
         if self.reaches == "minjerk":
-            return partition_minjerk.build(self.into, engine)
+            return building_minjerk.build(self.into, engine)
         if self.database is None:
             raise NeedsDatabase(f"splits of {self.reaches} reaches need --database, as `dextron-bench mc` makes it")
-        rows, tried = database.load(self.database), database.summary(self.database)["search"]["experts"]
-        return partition.build(open_source(self.reaches), rows, tried, self.into, engine)
+        rows, tried = experts_database.load(self.database), experts_database.summary(self.database)["search"]["experts"]
+        return building.build(open_source(self.reaches), rows, tried, self.into, engine)

@@ -59,37 +59,39 @@ class Submit:
     """Settings of a method or class, as JSON, like '{"near": 0.05}'."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard.submission import playing as contest
+        from dextron_bench.leaderboard.submission import playing
         from dextron_bench.methods.isolation.isolated_agent import Limits
 
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
         with progress_bar(entry.name, self.quiet) as progress:
-            folder = contest.compete(entry, self.runs, self.record, limits, self.threads, progress)
-        contest.finish(entry, folder, file)
+            folder = playing.compete(entry, self.runs, self.record, limits, self.threads, progress)
+        playing.finish(entry, folder, file)
         print_rows(self._standing(folder), as_json=False)
-        failures = contest.failures(folder, entry.seeds)
+        failures = playing.failures(folder, entry.seeds)
         for why, count in failures.items():
             print(f"{count} episodes failed: {why}")
         print(f"{file}: check it with `dextron-bench leaderboard verify {file}`, then send it in (docs/leaderboard.md)")
         return EPISODES_FAILED if failures else 0
 
     def _entry(self) -> Any:
-        from dextron_bench.leaderboard.submission import playing as contest
+        from dextron_bench.leaderboard.submission import entry as submission_entry
 
         seeds = tuple(dict.fromkeys(self.seed))
-        settings = contest.settle(self.agent, self.settings, self.reaches)
-        return contest.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared)
+        settings = submission_entry.settle(self.agent, self.settings, self.reaches)
+        return submission_entry.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared)
 
     def _standing(self, folder: Path) -> pd.DataFrame:
         """The leaderboard's rows on these reaches, this submission's among them."""
-        from dextron_bench.leaderboard import build as publication
-        from dextron_bench.runs import run_files as records
-        from dextron_bench.scores import standings as leaderboard
-        from dextron_bench.splits import loading as splits
+        from dextron_bench.leaderboard import collect
+        from dextron_bench.runs import result_files
+        from dextron_bench.scores import standings
+        from dextron_bench.splits.loading import ranking_splits
 
-        own = [records.read_result(folder / f"seed{seed}" / records.RESULT) for seed in dict.fromkeys(self.seed)]
-        others = (each for each in records.results(self.board / publication.RESULTS) if each["method"] != self.name)
-        rows = leaderboard.table([*own, *(each for each in others if each["reaches"] == self.reaches)])
-        return rows[rows["split"].isin(splits.evaluated(self.reaches))]
+        own = [
+            result_files.read_result(folder / f"seed{seed}" / result_files.RESULT) for seed in dict.fromkeys(self.seed)
+        ]
+        others = (each for each in result_files.results(self.board / collect.RESULTS) if each["method"] != self.name)
+        rows = standings.table([*own, *(each for each in others if each["reaches"] == self.reaches)])
+        return rows[rows["split"].isin(ranking_splits(self.reaches))]

@@ -40,18 +40,18 @@ class Data:
     def __call__(self) -> int:
         from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.splits import loading as splits
+        from dextron_bench.splits.loading import load_split
         from dextron_bench.storage import hashing
-        from dextron_bench.success import generation as collection
+        from dextron_bench.success import generation
 
         agents = {hashing.sha256(file): weights.own(file) for file in self.policies}
-        wanted = collection.Collection(self.reaches, self.seed, tuple(agents))
-        source, train = open_source(self.reaches), splits.load(self.reaches, "train").cases
+        wanted = generation.Collection(self.reaches, self.seed, tuple(agents))
+        source, train = open_source(self.reaches), load_split(self.reaches, "train").cases
         folder = folder_of(self.runs, self.reaches, self.seed)
         with progress_bar("transitions", self.quiet) as progress:
-            found = collection.collect(source, train, wanted, folder, self.rows, agents, self.threads, progress)
+            found = generation.collect(source, train, wanted, folder, self.rows, agents, self.threads, progress)
         rows = [{"kind": kind, **tally.about()} for kind, tally in found.items() if tally.rows]
-        rows.append({"kind": "all", **sum(found.values(), collection.Tally()).about()})
+        rows.append({"kind": "all", **sum(found.values(), generation.Tally()).about()})
         if self.json:
             print_json(rows)
         else:
@@ -83,16 +83,16 @@ class Train:
 
     def __call__(self) -> int:
         from dextron_bench.storage import tensors
-        from dextron_bench.success import training as fit
+        from dextron_bench.success import training
 
         folder = folder_of(self.runs, self.reaches, self.data)
         with progress_bar("epochs", self.quiet) as progress:
-            fit.fit(folder, fit.Fit(epochs=self.epochs, seed=self.seed), progress)
-        told = tensors.read_about(folder / fit.MODEL)
+            training.fit(folder, training.Fit(epochs=self.epochs, seed=self.seed), progress)
+        told = tensors.read_about(folder / training.MODEL)
         best = told["curve"][told["best_epoch"] - 1]
         columns = ["epoch", "loss", "accuracy", "test_loss", "test_accuracy"]
         print_table("the best epoch on episodes held out", columns, [[best[column] for column in columns]])
-        print(folder / fit.MODEL)
+        print(folder / training.MODEL)
         return 0
 
 

@@ -52,14 +52,14 @@ class Eval:
     def __call__(self) -> int:
         from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.splits import loading as splits
+        from dextron_bench.splits.loading import load_split, ranking_splits
         from dextron_bench.success import evaluation
 
         model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
         players = {"experts": None} | {str(policy): weights.own(policy) for policy in self.policies}
         rows = []
-        for name in self.split or splits.evaluated(self.reaches):
-            cases = _first(splits.load(self.reaches, name).cases, self.rows)
+        for name in self.split or ranking_splits(self.reaches):
+            cases = _first(load_split(self.reaches, name).cases, self.rows)
             for player, agent in players.items():
                 played = cases if agent else evaluation.contrasted(cases)
                 found = evaluation.evaluate(model, source, played, agent, self.threads)
@@ -100,15 +100,15 @@ class Explain:
         from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.scores import figures
-        from dextron_bench.splits import loading as splits
-        from dextron_bench.success import exemplars as explanation
+        from dextron_bench.splits.loading import load_split
+        from dextron_bench.success import exemplars
 
         model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
-        cases = _first(splits.load(self.reaches, self.split).cases, self.rows)
+        cases = _first(load_split(self.reaches, self.split).cases, self.rows)
         policies = {str(policy): weights.own(policy) for policy in self.policies}
-        found = explanation.choose(explanation.foreseen(model, source, cases, policies, self.threads))
+        found = exemplars.choose(exemplars.foreseen(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
-        figures.ridges({explanation.KINDS[kind]: seen for kind, seen in found.items()}, self.into)
+        figures.ridges({exemplars.KINDS[kind]: seen for kind, seen in found.items()}, self.into)
         columns = ["kind", "player", "row", "reach", "return", "cause", "steps foretold [%]"]
         numbers = {case.setting: row for row, case in enumerate(cases)}
         cells = [
@@ -124,7 +124,7 @@ class Explain:
             for kind, seen in found.items()
         ]
         print_table("episodes", columns, cells)
-        if lacking := [told for kind, told in explanation.KINDS.items() if kind not in found]:
+        if lacking := [told for kind, told in exemplars.KINDS.items() if kind not in found]:
             print(f"dextron-bench: none of these episodes shows: {'; '.join(lacking)}", file=sys.stderr)
         print(self.into)
         return 0
@@ -139,10 +139,9 @@ def _first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
 def chosen(file: Path | None, runs: Path, reaches: str) -> SuccessModel:
     """The model of a file; else the one trained in a folder of runs; else the one that ships."""
     from dextron_bench.storage import tensors
-    from dextron_bench.success import network
-    from dextron_bench.success import training as fit
+    from dextron_bench.success import network, training
 
-    own = folder_of(runs, reaches, 0) / fit.MODEL
+    own = folder_of(runs, reaches, 0) / training.MODEL
     if file is None and not own.exists():
         return network.shipped(reaches)
     place = file or own

@@ -15,7 +15,7 @@ from dextron_bench.cli.output import print_table, progress_bar
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dextron_bench.runs.selection import Wish
+    from dextron_bench.runs.selection import EpisodeFilter
 
 
 DIFFERS = 1
@@ -97,58 +97,58 @@ class View:
         places = self.place or (self.runs,)
         return [opened(place, self.runs) if place.suffix == ".zip" else place for place in places]
 
-    def _found(self, places: Sequence[Path], wish: Wish) -> list[Path]:
-        from dextron_bench.runs import selection as gallery
+    def _found(self, places: Sequence[Path], wish: EpisodeFilter) -> list[Path]:
+        from dextron_bench.runs import selection
 
-        return gallery.recordings(places) if wish == gallery.Wish() else self._picked(places, wish)
+        return selection.recordings(places) if wish == selection.EpisodeFilter() else self._picked(places, wish)
 
-    def _side_by_side(self, places: Sequence[Path], wish: Wish) -> Path:
-        from dextron_bench.runs import selection as gallery
-        from dextron_bench.runs import side_by_side as contrast
+    def _side_by_side(self, places: Sequence[Path], wish: EpisodeFilter) -> Path:
+        from dextron_bench.runs import selection, side_by_side
 
         if len(places) != 2:
-            raise gallery.BadWish(f"--diff takes two places, recordings or runs; it got {len(self.place)}")
+            raise selection.BadFilter(f"--diff takes two places, recordings or runs; it got {len(self.place)}")
         first, second = places
-        return contrast.contrast(first, second, wish, self.runs)
+        return side_by_side.contrast(first, second, wish, self.runs)
 
     def _perform(self) -> int:
         from dextron_bench import recording
+        from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.runs import selection as gallery
-        from dextron_bench.splits import loading as splits
-        from dextron_bench.success import live, network
+        from dextron_bench.runs import selection
+        from dextron_bench.splits.loading import load_split
+        from dextron_bench.success import live as success_live
+        from dextron_bench.success import network
 
         if len(self.method) != 1:
-            raise gallery.BadWish("--live takes one --method, such as rlil or exp")
+            raise selection.BadFilter("--live takes one --method, such as rlil or exp")
         if not 0.0 <= self.speed < float("inf"):
-            raise gallery.BadWish(f"--speed {self.speed:g}: it plays so many times as fast as life, or 0: at once")
+            raise selection.BadFilter(f"--speed {self.speed:g}: it plays so many times as fast as life, or 0: at once")
         reaches = self.reaches[0] if self.reaches else "synthetic"
-        label, agent = live.performer(self.method[0], reaches, self.seed[0] if self.seed else 0)
-        split = splits.load(reaches, self.split[0] if self.split else "test")
+        label, agent = weights.agent_by_name(self.method[0], reaches, self.seed[0] if self.seed else 0)
+        split = load_split(reaches, self.split[0] if self.split else "test")
         model, source = network.shipped(reaches), open_source(reaches)
         cases = {row: split.case(row) for row in self.row or (0,)}
-        with recording.theatre() as (connect, wait):
+        with recording.open_live_viewer() as (connect, wait):
             for row, case in cases.items():
                 about = {"method": label, "reaches": reaches, "split": split.name, "row": row}
-                stage = recording.Stage(connect, f"{label}, {split.name} {row}", source.path(case.setting), about)
-                episode = live.play(agent, source, case, model, stage, self.speed)
+                stage = recording.LiveView(connect, f"{label}, {split.name} {row}", source.path(case.setting), about)
+                episode = success_live.play(agent, source, case, model, stage, self.speed)
                 print(f"{label} on row {row} of {split.name}: {episode.score:g} of 20")
             wait()
         return 0
 
-    def _wish(self) -> Wish:
-        from dextron_bench.runs.selection import Wish
+    def _wish(self) -> EpisodeFilter:
+        from dextron_bench.runs.selection import EpisodeFilter
 
-        return Wish(**{name: getattr(self, name) for name in Wish.__slots__})
+        return EpisodeFilter(**{name: getattr(self, name) for name in EpisodeFilter.__slots__})
 
-    def _picked(self, places: Sequence[Path], wish: Wish) -> list[Path]:
+    def _picked(self, places: Sequence[Path], wish: EpisodeFilter) -> list[Path]:
         """The recordings of picked episodes; what they are is told, where no program reads it."""
-        from dextron_bench.runs import rerecording as restoration
-        from dextron_bench.runs import selection as gallery
+        from dextron_bench.runs import rerecording, selection
 
-        picked, matching = gallery.pick(gallery.episodes(places), wish)
+        picked, matching = selection.select(selection.episodes(places), wish)
         with progress_bar("recordings", self.quiet) as progress:
-            files = restoration.restore(picked, progress)
+            files = rerecording.restore(picked, progress)
         if not self.print:
             _tell(picked)
         if len(picked) < matching and wish.worst is None and wish.best is None:
@@ -160,14 +160,14 @@ class View:
 
 
 def _whole(files: Sequence[Path]) -> list[Path]:
-    """The recordings that can be trusted; of the others a line each tells why not. Raises NothingToView."""
+    """The recordings that can be trusted; of the others a line each tells why not. Raises NoEpisodes."""
     from dextron_bench import recording
-    from dextron_bench.runs import selection as gallery
+    from dextron_bench.runs import selection
 
-    found = list(recording.summarise(files, whole=True, hashes=gallery.hashes(files)))
+    found = list(recording.summarise(files, whole=True, hashes=selection.hashes(files)))
     damaged = [f"{summary.file}: {summary.damage}" for summary in found if summary.damage]
     if len(damaged) == len(found):
-        raise gallery.NothingToView("; ".join(damaged))
+        raise selection.NoEpisodes("; ".join(damaged))
     for line in damaged:
         print(f"dextron-bench: {line}", file=sys.stderr)
     return [summary.file for summary in found if not summary.damage]

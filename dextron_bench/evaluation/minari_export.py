@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.rollout import Agent, rollout
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import provenance

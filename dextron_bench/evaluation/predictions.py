@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dextron_bench.experts import policies as experts
+from dextron_bench.experts import policies
 from dextron_bench.experts.policies import Expert
 from dextron_bench.world import task
 
 
 @dataclass(frozen=True, slots=True)
-class Insight:
+class StepPredictions:
     """What a recording shows of an episode of T steps besides its own arrays.
 
     `curves` (T, A) are the chances of success of the actions `grid` (A,) from -1 to 1. `chances` (T,) are the chances
@@ -30,7 +30,7 @@ class Insight:
 def expert_actions(expert: Expert, states: np.ndarray) -> np.ndarray:
     """What an expert would have done (T,) in states (T, 48) that came one after the other."""
     distances = task.distance(states)
-    closing = experts.closes(distances, np.full(len(states), distances[0]), np.full(len(states), expert.critical))
-    actions = experts.law(task.closure(states), closing, np.full(len(states), expert.gain))[:, 0]
+    closing = policies.closes(distances, np.full(len(states), distances[0]), np.full(len(states), expert.critical))
+    actions = policies.law(task.closure(states), closing, np.full(len(states), expert.gain))[:, 0]
     actions[0] = 0.0
     return actions

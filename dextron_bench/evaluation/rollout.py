@@ -3,58 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.experts.policies import Case
+from dextron_bench.methods.agents import Agent, AgentCrashed, AgentError, Privileged, as_agent_error
 from dextron_bench.reaches.setting import Source
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine, Step
 
 SLOTS = 256  # Episodes at once. Fixed, because an entrant's last bits may depend on the batch (see `exact`).
-
-
-class Agent(Protocol):
-    """Acts in N episodes at once; may keep memory per episode."""
-
-    def reset(self, episodes: np.ndarray) -> None:
-        """Tells that rows `episodes` (n,) of the states to come begin a new episode."""
-        ...
-
-    def act(self, states: np.ndarray) -> np.ndarray:
-        """Maps states (N, 48) to closing speeds (N, 1) in [-1, 1]. N stays the same from call to call."""
-        ...
-
-
-@runtime_checkable
-class Privileged(Protocol):
-    """An agent that is told each setting's own expert: EXP, and no other on the leaderboard."""
-
-    def assign(self, episodes: np.ndarray, experts: Sequence[Expert]) -> None:
-        """Comes before `reset`: rows `episodes` (n,) are about to play these experts' settings."""
-        ...
-
-
-class AgentError(ValueError):
-    """An agent that raises, or whose actions are not of the agreed shape."""
-
-
-class AgentDown(RuntimeError):
-    """Raised in `act` by an agent that can start again: it fails the episodes that are being played, and no others."""
-
-
-@contextmanager
-def blaming(what: str) -> Iterator[None]:
-    """Makes what an entrant's own code raises an AgentError that says where: `what`, a phrase like "act()"."""
-    try:
-        yield
-    except (AgentDown, AgentError):
-        raise
-    except Exception as error:
-        raise AgentError(f"{what} raised {type(error).__name__}: {error}; --debug shows where") from error
 
 
 def rollout(
@@ -63,7 +22,7 @@ def rollout(
     """Plays every case once; yields (index of the case, episode) as episodes end.
 
     Raises AgentError where the agent raises or actions have a wrong shape. An action that is not finite or lies outside
-    [-1, 1] fails its own episode and no other; AgentDown fails those that are being played.
+    [-1, 1] fails its own episode and no other; AgentCrashed fails those that are being played.
     """
     return _Evaluation(agent, source, cases, Engine(min(slots, max(len(cases), 1)), threads)).run()
 
@@ -88,7 +47,7 @@ class _Evaluation:
         while (live := np.flatnonzero(self._case >= 0)).size:
             try:
                 actions = self._ask()
-            except AgentDown as error:
+            except AgentCrashed as error:
                 yield from [self._episode(slot, failure=str(error)) for slot in live.tolist()]
                 self._refill(live)
                 continue
@@ -102,7 +61,7 @@ class _Evaluation:
             self._refill(np.union1d(sound[ended], faulty))
 
     def _ask(self) -> np.ndarray:
-        with blaming("the agent's act()"):
+        with as_agent_error("the agent's act()"):
             actions = np.asarray(self._agent.act(self._now.copy()))
         if actions.shape != (len(self._now), 1) or actions.dtype.kind != "f":
             raise AgentError(
@@ -125,7 +84,7 @@ class _Evaluation:
         self._length[slots] = 0
         if isinstance(self._agent, Privileged):
             self._agent.assign(slots, [case.expert for case in cases])
-        with blaming("the agent's reset()"):
+        with as_agent_error("the agent's reset()"):
             self._agent.reset(slots)
 
     def _note(self, slots: np.ndarray, actions: np.ndarray, step: Step) -> None:

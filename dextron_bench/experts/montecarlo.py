@@ -14,9 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import blocks
-from dextron_bench.experts import branching as opening
-from dextron_bench.experts import policies as experts
+from dextron_bench.experts import blocks, branching, policies
 from dextron_bench.reaches import setting
 from dextron_bench.storage import folder_config
 from dextron_bench.world.engine import Engine
@@ -50,20 +48,20 @@ def draw(source: setting.Source, search: Search, block: int) -> pd.DataFrame:
     """The draws of one block: fields of `Setting`, `gain`, `critical`; `experts` rows a setting."""
     rng = np.random.default_rng([search.seed, block])
     settings = setting.to_frame([source.sample(rng) for _ in range(search.block)])
-    low, high = experts.CRITICAL_DISTANCE
+    low, high = policies.CRITICAL_DISTANCE
     band = np.arange(search.experts) + rng.uniform(size=(search.block, search.experts))
     draws = settings.loc[settings.index.repeat(search.experts)].reset_index(drop=True)
-    draws["gain"] = np.repeat(rng.uniform(*experts.GAIN, search.block), search.experts)
+    draws["gain"] = np.repeat(rng.uniform(*policies.GAIN, search.block), search.experts)
     draws["critical"] = (low + (high - low) * band / search.experts).ravel()
     return draws
 
 
-def questions(source: setting.Source, draws: pd.DataFrame, experts_each: int) -> Iterator[opening.Question]:
-    """One question for each run of `experts_each` rows that share a setting."""
+def batches(source: setting.Source, draws: pd.DataFrame, experts_each: int) -> Iterator[branching.ExpertBatch]:
+    """One batch for each run of `experts_each` rows that share a setting."""
     gains, criticals = draws["gain"].to_numpy(), draws["critical"].to_numpy()
     firsts = range(0, len(draws), experts_each)
     for i, case in zip(firsts, setting.from_frame(draws.iloc[::experts_each]), strict=True):
-        yield opening.Question(source.path(case), gains[i], criticals[i : i + experts_each])
+        yield branching.ExpertBatch(source.path(case), gains[i], criticals[i : i + experts_each])
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,13 +143,13 @@ def _play(
     skip = frozenset(done)
     under_way: list[_Block] = []
 
-    def asked() -> Iterator[opening.Question]:
+    def asked() -> Iterator[branching.ExpertBatch]:
         for block in (number for number in itertools.count(share.index, share.of) if number not in skip):
             draws = draw(source, search, block)
             under_way.append(_Block(block, draws, np.zeros(len(draws)), np.zeros(len(draws), int), search.block))
-            yield from questions(source, draws, search.experts)
+            yield from batches(source, draws, search.experts)
 
-    for number, found in opening.answer(engine, asked()):
+    for number, found in branching.play(engine, asked()):
         current = under_way[number // search.block]
         first = number % search.block * search.experts
         rows = slice(first, first + search.experts)

@@ -10,8 +10,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import quote, unquote
 
+from dextron_bench.leaderboard.highlights import FOLDER
 from dextron_bench.leaderboard.page import FILE
-from dextron_bench.leaderboard.page.showreel import FOLDER
 
 LOOPBACK = "127.0.0.1"
 NAMES = LOOPBACK, "localhost"  # What a browser may call this machine; any other name is another site's (DNS rebinding).

@@ -13,20 +13,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench.evaluation import rollout
-from dextron_bench.leaderboard import build as publication
-from dextron_bench.leaderboard.page.showreel import FOLDER
-from dextron_bench.leaderboard.submission import bundle
-from dextron_bench.leaderboard.submission import episode_tables as tables
-from dextron_bench.leaderboard.submission import replay_check as replaying
-from dextron_bench.methods import registry as methods
-from dextron_bench.methods import weights
-from dextron_bench.methods.learners import Heir, Learner
+from dextron_bench.evaluation import episode_table
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.leaderboard import build, collect
+from dextron_bench.leaderboard.highlights import FOLDER
+from dextron_bench.leaderboard.submission import bundle, episode_tables, replay_check
+from dextron_bench.methods import agents, registry, weights
+from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded.cache import MissingData
-from dextron_bench.runs import execution as run
-from dextron_bench.runs import run_files as records
-from dextron_bench.splits import loading as splits
+from dextron_bench.runs import execution, plans, result_files, run_files
+from dextron_bench.splits.loading import Split, load_split, ranking_splits
 from dextron_bench.storage import atomic
 
 Report = Callable[[int, int], None]  # Told (episodes done, all).
@@ -51,8 +48,8 @@ class Row:
 
 def rows(board: Path, wanted: Sequence[str] = (), reaches: Sequence[str] = ()) -> list[Row]:
     """The rows of a board, those of the wanted methods and sources; raises NothingToVerify, DamagedFile."""
-    files = sorted((board / publication.RESULTS).glob(f"*/*/seed*/{records.RESULT}"))
-    found = [Row(file.parent, records.read_result(file)) for file in files]
+    files = sorted((board / collect.RESULTS).glob(f"*/*/seed*/{result_files.RESULT}"))
+    found = [Row(file.parent, result_files.read_result(file)) for file in files]
     kept = [row for row in found if not wanted or row.result["method"] in wanted]
     kept = [row for row in kept if not reaches or row.result["reaches"] in reaches]
     if not kept:
@@ -76,7 +73,7 @@ class Finding:
 def check(row: Row, some: int = 0, threads: int = 0, report: Report = lambda done, total: None) -> Finding:
     """Checks a row of a board; of a baseline's splits `some` rows drawn at random, 0 for all."""
     try:
-        if (row.folder / records.EPISODES).exists():
+        if (row.folder / run_files.EPISODES).exists():
             return _replayed(row, threads, report)
         return _rerun(row, some, threads, report)
     except MissingData as error:
@@ -88,24 +85,24 @@ def stamp(row: Row, finding: Finding) -> bool:
     if finding.problems or finding.actions.keys() != row.result["splits"].keys():
         return False
     told = {name: split | {"actions": finding.actions[name]} for name, split in row.result["splits"].items()}
-    atomic.write_json(row.folder / records.RESULT, {**row.result, "splits": told, "tier": "re-run"})
+    atomic.write_json(row.folder / result_files.RESULT, {**row.result, "splits": told, "tier": "re-run"})
     return True
 
 
 def _replayed(row: Row, threads: int, report: Report) -> Finding:
     reaches = row.result["reaches"]
-    wanted = [splits.load(reaches, name) for name in splits.evaluated(reaches)]
-    table = tables.read(row.folder / records.EPISODES, wanted)
-    if problems := list(tables.faults(table, wanted)):
+    wanted = [load_split(reaches, name) for name in ranking_splits(reaches)]
+    table = episode_tables.read(row.folder / run_files.EPISODES, wanted)
+    if problems := list(episode_tables.faults(table, wanted)):
         return Finding("", problems)
-    found = replaying.again(sources.open_source(reaches), wanted, table, threads, report)
+    found = replay_check.again(sources.open_source(reaches), wanted, table, threads, report)
     manifest = atomic.read_json(row.folder.parent / bundle.MANIFEST)
     told = [row.result.get(name) for name in ("method", "reaches", "declared")]
     if told != [manifest.get(name) for name in ("name", "reaches", "declared")]:
         return Finding("", ["its name, reaches or declarations are not those that its manifest has"])
     if problem := _misplaced(row, [f"seed{seed}" for seed in manifest.get("seeds", [])]):
         return Finding("", [problem])
-    if records.scores(found.rows) != row.result["splits"]:
+    if result_files.scores(found.rows) != row.result["splits"]:
         return Finding("", ["its result is not what its actions, played again, give", *found.differing[:5]])
     return Finding(f"replayed, {found.exact} of {found.episodes} episodes equal bit for bit")
 
@@ -123,10 +120,10 @@ def _rerun(row: Row, some: int, threads: int, report: Report) -> Finding:
     found, done = Finding(""), 0
     total = sum(len(told["scores"]) for told in row.result["splits"].values())
     try:
-        if lacking := set(splits.evaluated(row.result["reaches"])) - row.result["splits"].keys():
+        if lacking := set(ranking_splits(row.result["reaches"])) - row.result["splits"].keys():
             found.problems.append(f"lacks {', '.join(sorted(lacking))}")
         for name in row.result["splits"]:
-            split = splits.load(row.result["reaches"], name)
+            split = load_split(row.result["reaches"], name)
             told = row.result["splits"][name]
             if split.digest != told["digest"]:
                 found.problems.append(f"{name} is of another version of the split")
@@ -136,19 +133,19 @@ def _rerun(row: Row, some: int, threads: int, report: Report) -> Finding:
                 continue
             done += _rerun_split(row, split, _chosen(len(split.cases), some), threads, found)
             report(done, total)
-    except (NothingToVerify, weights.MissingWeights, rollout.AgentError) as error:
+    except (NothingToVerify, weights.MissingWeights, agents.AgentError) as error:
         found.problems.append(str(error))
     found.done = f"run again, {done} of {total} episodes, all equal"
     return found
 
 
-def _rerun_split(row: Row, split: splits.Split, numbers: np.ndarray, threads: int, found: Finding) -> int:
+def _rerun_split(row: Row, split: Split, numbers: np.ndarray, threads: int, found: Finding) -> int:
     """Runs a row's agent on rows of a split, notes what it finds; returns how many were played in the end."""
     source, cases = sources.open_source(split.reaches), [split.cases[number] for number in numbers]
-    played = dict(rollout.rollout(_agent(row), source, cases, threads=threads))
+    played = dict(rollout(_agent(row), source, cases, threads=threads))
     told, whole = row.result["splits"][split.name], len(numbers) == len(split.cases)
-    rows = [records.row(split, int(number), played[place]) for place, number in enumerate(numbers)]
-    made = records.scores(pd.DataFrame(rows))[split.name]
+    rows = [episode_table.row(split, int(number), played[place]) for place, number in enumerate(numbers)]
+    made = result_files.scores(pd.DataFrame(rows))[split.name]
     problems = [f"{split.name} {what}" for what in _other(told, made, numbers, whole)]
     if problems and not whole:  # Some agents, such as dice, act otherwise beside others.
         return _rerun_split(row, split, np.arange(len(split.cases)), threads, found)
@@ -177,23 +174,23 @@ def _chosen(count: int, some: int) -> np.ndarray:
     return np.sort(np.random.default_rng().choice(count, some, replace=False))
 
 
-def _agent(row: Row) -> rollout.Agent:
+def _agent(row: Row) -> agents.Agent:
     """The agent of a baseline's row: from the code and the weights that ship; raises NothingToVerify and others."""
     told, seed = row.result.get("maker", {}), row.result["seed"]
-    if told.get("method") not in methods.known():
+    if told.get("method") not in registry.known():
         raise NothingToVerify("has neither its episodes nor a method that ships")
-    plan = run.Plan(told["method"], row.result["reaches"], (), seed, settings=told["settings"])
+    plan = plans.Plan(told["method"], row.result["reaches"], (), seed, settings=told["settings"])
     method = plan.make()
     place, claimed = row.folder.parts[-3:], (row.result["method"], row.result["reaches"], f"seed{seed}")
-    if place != claimed or claimed[:2] != (plan.label, plan.home):
-        raise NothingToVerify(f"lies in {'/'.join(place)}, but was made by {plan.label} on {plan.home} reaches")
-    if isinstance(method, Heir | Learner):
-        plan = run.shipped(plan, [seed])[0]
+    if place != claimed or claimed[:2] != (plan.label, plan.source):
+        raise NothingToVerify(f"lies in {'/'.join(place)}, but was made by {plan.label} on {plan.source} reaches")
+    if isinstance(method, PolicyTransfer | Learner):
+        plan = plans.shipped(plan, [seed])[0]
         assert plan.weights
         told, true = row.result["training"], weights.about(plan.weights)
         if other := [name for name in ("sha256", *true) if told.get(name) != true[name]]:
             raise NothingToVerify(f"was made with other weights than those that ship: its {other[0]} is another")
-    return run.agent(method, seed, plan.weights)
+    return execution.agent(method, seed, plan.weights)
 
 
 def pages(board: Path) -> list[str]:
@@ -203,7 +200,7 @@ def pages(board: Path) -> list[str]:
         shutil.copytree(board, again)
         if (beside := board.resolve().parent / FOLDER).exists():
             (Path(folder) / FOLDER).symlink_to(beside)  # The page tells of the recordings beside the board.
-        publication.build(again)
+        build.build(again)
         made = [file for file in sorted(again.iterdir()) if file.suffix in (".md", ".csv", ".json", ".html")]
         return [f"{file.name} differs" for file in made if not _same(file, board / file.name)]
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 if TYPE_CHECKING:  # A learner's file is read by the isolated process of its agent, which may not import the world.
-    from dextron_bench.evaluation.rollout import Agent
     from dextron_bench.experts.policies import Case
+    from dextron_bench.methods.agents import Agent
     from dextron_bench.reaches.setting import Source
 
 Arrays = dict[str, np.ndarray]  # Named arrays, as a safetensors file holds them.
@@ -72,14 +72,15 @@ class Trainer(Protocol):
 class Learner(Protocol):
     """A method that trains: a frozen dataclass whose fields are its settings, each with a default.
 
-    `label` names its runs and its row and tells settings apart, as "rlil-0.1" does. Of its `epochs`, every
-    `period` ones there is a checkpoint and a point of the learning curve. A `home` that is not empty is the source
-    of reaches where it is trained and evaluated, whatever a run asks for: SIM's is "minjerk". `rehearsal` is a
-    learner, perhaps itself, of whose epochs the last takes as long as most of this one's: how time is foretold.
+    `label` names its runs and its row, and distinguishes settings, as "rlil-0.1" does. It trains for `epochs`; every
+    `period` epochs there is a checkpoint and a point of the learning curve. `train_source` names the source of reaches
+    on which it is trained and evaluated, whatever source a run asks for: "minjerk" for SIM; if it is empty, the run
+    decides. `timing_run` is a learner, perhaps itself, whose last epoch takes as long as most epochs of this one: it
+    serves to estimate the time of a training.
     """
 
     name: ClassVar[str]
-    home: ClassVar[str]
+    train_source: ClassVar[str]
 
     @property
     def label(self) -> str: ...
@@ -91,7 +92,7 @@ class Learner(Protocol):
     def period(self) -> int: ...
 
     @property
-    def rehearsal(self) -> Learner: ...
+    def timing_run(self) -> Learner: ...
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """A trainer at its start, 0 epochs done."""
@@ -103,8 +104,8 @@ class Learner(Protocol):
 
 
 @runtime_checkable
-class Heir(Protocol):
-    """A method that trains nothing: it takes the policy of its `teacher`, a learner, to other reaches, as SOR does."""
+class PolicyTransfer(Protocol):
+    """A method that trains nothing: it takes the policy of the learner `source_policy` to other reaches, like SOR."""
 
     name: ClassVar[str]
 
@@ -112,4 +113,4 @@ class Heir(Protocol):
     def label(self) -> str: ...
 
     @property
-    def teacher(self) -> Learner: ...
+    def source_policy(self) -> Learner: ...

@@ -9,10 +9,11 @@ from dataclasses import asdict, fields, is_dataclass
 from importlib.metadata import entry_points
 from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
-from dextron_bench.evaluation.rollout import Agent, AgentError, blaming
-from dextron_bench.methods import loading as entrants
-from dextron_bench.methods.learners import Heir, Learner
+from dextron_bench.methods import loading, registry
+from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
+from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.loading import UnknownMethod
+from dextron_bench.world import model
 
 GROUP = "dextron_bench.methods"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")  # A run's folder is called like its method.
@@ -40,15 +41,15 @@ class Method(Protocol):
 
 
 @runtime_checkable
-class Situated(Protocol):
+class SourceAware(Protocol):
     """A method that acts by what is known of its source of reaches, as OMEGA does by a model of success there."""
 
-    def made_for(self, reaches: str) -> Method:
+    def for_source(self, reaches: str) -> Method:
         """The method as it acts on that source; its settings, with which it can be made again, say by what."""
         ...
 
 
-Entrant: TypeAlias = Method | Learner | Heir
+Entrant: TypeAlias = Method | Learner | PolicyTransfer
 
 
 class BadSettings(ValueError):
@@ -68,8 +69,8 @@ def find(spec: str) -> type[Entrant]:
             raise UnknownMethod(
                 f"no method {spec!r}; choose from {', '.join(known())}, or give module:Class or file.py:Class"
             )
-        return _checked(spec, entrants.loaded(spec, found[0].load))
-    return _checked(spec, entrants.find(spec))
+        return _checked(spec, loading.loaded(spec, found[0].load))
+    return _checked(spec, loading.find(spec))
 
 
 def create(spec: str, settings: Mapping[str, Any] | None = None, reaches: str = "") -> Entrant:
@@ -80,8 +81,8 @@ def create(spec: str, settings: Mapping[str, Any] | None = None, reaches: str = 
     found = find(spec)
     with _making(spec):
         made = found(**(settings or {}))
-        if reaches and isinstance(made, Situated):
-            made = made.made_for(reaches)
+        if reaches and isinstance(made, SourceAware):
+            made = made.for_source(reaches)
         called = label(made)
     if not isinstance(called, str) or not NAME.fullmatch(called):
         raise UnknownMethod(f"{spec!r} has the label {called!r}: use letters, digits and . _ + -, as in 'rlil-0.1'")
@@ -107,14 +108,14 @@ def label(method: Entrant) -> str:
     return getattr(method, "label", method.name)
 
 
-def home(method: Entrant, reaches: str) -> str:
+def run_source(method: Entrant, reaches: str) -> str:
     """The source of reaches of a method's run that was asked for on `reaches`."""
-    return (getattr(method, "home", "") if isinstance(method, Learner) else "") or reaches
+    return (getattr(method, "train_source", "") if isinstance(method, Learner) else "") or reaches
 
 
 def origin(spec: str) -> dict[str, str | None]:
     """Where a method's code is from: its class, and for a file the SHA-256 of its content."""
-    return entrants.origin(find(spec))
+    return loading.origin(find(spec))
 
 
 def describe(name: str) -> str:
@@ -134,7 +135,7 @@ def settings(method: Entrant) -> dict[str, Any]:
 def _making(spec: str) -> Iterator[None]:
     """Makes an entrant's ValueError BadSettings, and what else its code raises an AgentError."""
     try:
-        with blaming(f"making method {spec!r}"):
+        with as_agent_error(f"making method {spec!r}"):
             yield
     except AgentError as error:
         if isinstance(error.__cause__, ValueError):
@@ -143,7 +144,7 @@ def _making(spec: str) -> Iterator[None]:
 
 
 def _checked(spec: str, found: Any) -> type[Entrant]:
-    offers = [name for name in ("agent", "trainer", "teacher") if hasattr(found, name)]
+    offers = [name for name in ("agent", "trainer", "source_policy") if hasattr(found, name)]
     if not isinstance(found, type) or not offers or not hasattr(found, "name"):
         raise UnknownMethod(
             f"{spec!r} is not a method: it needs to be a class with `name` and `agent(seed)`, "
@@ -152,3 +153,15 @@ def _checked(spec: str, found: Any) -> type[Entrant]:
     if not isinstance(found.name, str) or not NAME.fullmatch(found.name):
         raise UnknownMethod(f"{spec!r} has the name {found.name!r}: use letters, digits and . _ + -, as in 'my-method'")
     return found
+
+
+def config(method: registry.Entrant, reaches: str, seed: int) -> dict[str, Any]:
+    """What a method's run depends on, as `config.json` says it."""
+    return {
+        "method": method.name,
+        "code": loading.origin(type(method)),
+        "settings": registry.settings(method),
+        "reaches": reaches,
+        "seed": seed,
+        "physics": model.mjcf_hash(),
+    }

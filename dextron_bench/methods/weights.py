@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import inspect
-import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dextron_bench.evaluation.rollout import Agent, AgentError, blaming
-from dextron_bench.methods import registry as methods
-from dextron_bench.methods.learners import Learner
-from dextron_bench.storage import atomic, hashing, tensors
-from dextron_bench.storage.folder_config import FolderMismatch
+from dextron_bench.methods import registry, weights
+from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
+from dextron_bench.methods.learners import Learner, PolicyTransfer
+from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 
 FILE = "weights.safetensors"  # In a run's folder.
@@ -47,7 +45,7 @@ def labels(learner: Learner, reaches: str) -> list[str]:
 
 def everything(reaches: str) -> list[Path]:
     """All weights that ship for a source of reaches, those of the methods' own and their neighbours', in order."""
-    learners = [made for made in map(methods.create, methods.known()) if isinstance(made, Learner)]
+    learners = [made for made in map(registry.create, registry.known()) if isinstance(made, Learner)]
     beside = {place(learner, reaches).parents[1] for learner in learners}
     return sorted(file for folder in beside for file in folder.glob(f"*/{reaches}/seed*.safetensors"))
 
@@ -73,7 +71,7 @@ def agent(learner: Learner, file: Path) -> Agent:
     if bad := [name for name, array in arrays.items() if not np.isfinite(array).all()]:
         raise BadWeights(f"{file} holds numbers in {bad[0]!r} that are not finite")
     try:
-        with blaming("policy()"):
+        with as_agent_error("policy()"):
             made = learner.policy(arrays)
             made.reset(np.arange(1))
             shape = np.shape(made.act(np.tile(_still(), (1, 1))))
@@ -92,24 +90,29 @@ def own(file: Path) -> Agent:
     found = tensors.read_about(file)
     if not {"method", "settings"} <= found.keys():
         raise BadWeights(f"{file} does not say which method's weights it holds")
-    learner = methods.create(found["method"], found["settings"])
+    learner = registry.create(found["method"], found["settings"])
     if not isinstance(learner, Learner):
         raise BadWeights(f"{file} says it holds weights of {found['method']!r}, which has none")
     return agent(learner, file)
 
 
-def adopt(file: Path, folder: Path) -> Path:
-    """Copies weights into a run's folder, or checks that they are those there; raises FolderMismatch."""
-    own = folder / FILE
-    if not own.exists():
-        atomic.write_atomically(own, lambda part: shutil.copyfile(file, part))
-    if hashing.sha256(own) != hashing.sha256(file):
-        raise FolderMismatch(
-            f"{folder} holds a run with other weights; remove it, or choose another folder with --runs"
-        )
-    return own
-
-
 def _still() -> np.ndarray:
     """A state (48,) at rest."""
     return np.concatenate([model.half_closed(), np.zeros(model.STATE - len(model.half_closed()))])
+
+
+def agent_by_name(name: str, reaches: str, seed: int = 0) -> tuple[str, Agent]:
+    """The agent that a name stands for: a row of the leaderboard whose weights ship, or its beginning; or a method.
+
+    Raises MissingWeights, UnknownMethod, BadSettings, AgentError.
+    """
+    ships = {file.parts[-3]: file for file in weights.everything(reaches) if file.stem == f"seed{seed}"}
+    if label := next((label for label in ships if label == name or label.startswith(f"{name}-")), None):
+        return label, weights.own(ships[label])
+    method = registry.create(name, reaches=reaches)
+    if isinstance(method, Learner | PolicyTransfer):
+        raise weights.MissingWeights(
+            f"no weights of {name!r} ship for {reaches} reaches and seed {seed}; there are {', '.join(ships) or 'none'}"
+        )
+    with as_agent_error(f"agent({seed}) of method {name!r}"):
+        return registry.label(method), method.agent(seed)

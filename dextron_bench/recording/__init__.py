@@ -4,7 +4,7 @@ The only package that talks to Rerun.
 """
 
 from dextron_bench.recording.episode_file import BrokenRecording, Recorded, Value, read, write
-from dextron_bench.recording.live_view import Stage, theatre
+from dextron_bench.recording.live_view import LiveView, open_live_viewer
 from dextron_bench.recording.pair import UnequalSettings, pair
 from dextron_bench.recording.rrd_file import UnwritableRecording
 from dextron_bench.recording.summaries import ReaderError, Summary, read_safely, read_screened, screen, summarise
@@ -13,14 +13,15 @@ from dextron_bench.recording.web_viewer import web_viewer
 
 __all__ = [
     "BrokenRecording",
+    "LiveView",
     "ReaderError",
     "Recorded",
-    "Stage",
     "Summary",
     "UnequalSettings",
     "UnwritableRecording",
     "Value",
     "ViewerError",
+    "open_live_viewer",
     "pair",
     "read",
     "read_safely",
@@ -28,7 +29,6 @@ __all__ = [
     "screen",
     "screenshots",
     "summarise",
-    "theatre",
     "view",
     "web_viewer",
     "write",

@@ -11,8 +11,7 @@ import rerun.blueprint as rrb
 from rerun.chunk import Chunk
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.recording import scene
-from dextron_bench.recording import success_plots as foresight
+from dextron_bench.recording import scene, success_plots
 from dextron_bench.world import task
 
 EYE, TARGET = (0.66, -0.62, 0.40), (-0.07, -0.10, 0.20)  # [m] whence and whither the 3D view looks.
@@ -163,7 +162,7 @@ def _bars() -> rrb.BarChartView:
 
 
 def _ridge() -> rrb.Spatial2DView:
-    bounds = rrb.VisualBounds2D(x_range=(-1.25, 1.25), y_range=(-foresight.HEIGHT - 0.6, 0.4))
+    bounds = rrb.VisualBounds2D(x_range=(-1.25, 1.25), y_range=(-success_plots.HEIGHT - 0.6, 0.4))
     return rrb.Spatial2DView(
         origin="/ridge",
         name="Chances, by share of the reach",

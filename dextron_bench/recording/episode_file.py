@@ -18,13 +18,10 @@ import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.reaches import reach
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.recording import blueprint as layout
-from dextron_bench.recording import rrd_file as storage
-from dextron_bench.recording import scene
-from dextron_bench.recording import success_plots as foresight
+from dextron_bench.recording import blueprint, rrd_file, scene, success_plots
 from dextron_bench.recording.digest import digest, lines
 from dextron_bench.recording.rrd_file import APPLICATION
 from dextron_bench.world import model
@@ -51,7 +48,11 @@ class BrokenRecording(ValueError):
 
 
 def write(
-    file: Path, episode: Episode, path: reach.Path, properties: Mapping[str, Value], insight: Insight | None = None
+    file: Path,
+    episode: Episode,
+    path: reach.Path,
+    properties: Mapping[str, Value],
+    insight: StepPredictions | None = None,
 ) -> str:
     """Writes an episode that followed `path` to `file`, whole or not at all; returns the file's SHA-256.
 
@@ -63,13 +64,13 @@ def write(
     chunks = [*_chunks(episode, properties), scene.plan(path), *scene.chunks(episode.states)]
     if insight:
         last = len(episode.actions) - 1
-        chunks += [*foresight.looks(insight.grid), *foresight.chunks(insight, episode.actions)]
-        chunks += foresight.ridge(insight, episode.actions[:, 0], last, episode.success)
+        chunks += [*success_plots.looks(insight.grid), *success_plots.chunks(insight, episode.actions)]
+        chunks += success_plots.ridge(insight, episode.actions[:, 0], last, episode.success)
     props, told = _props()
     identity = digest([*told, *lines(chunks)])
     chunks += [*props, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
-    application = storage.APPLICATION if insight else storage.PLAIN
-    return storage.save(file, chunks, identity, layout.blueprint(insight is not None), application)
+    application = rrd_file.APPLICATION if insight else rrd_file.PLAIN
+    return rrd_file.save(file, chunks, identity, blueprint.blueprint(insight is not None), application)
 
 
 def read(file: Path, sha256: str | None = None) -> Recorded:
@@ -101,7 +102,7 @@ def read(file: Path, sha256: str | None = None) -> Recorded:
 @cache
 def _props() -> tuple[list[Chunk], list[str]]:
     """What every recording has, and its lines of the digest."""
-    chunks = [*scene.props(), *layout.lines()]
+    chunks = [*scene.props(), *blueprint.lines()]
     return chunks, list(lines(chunks))
 
 
@@ -116,12 +117,12 @@ def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk
         when = scene.timelines(first, first + len(values) - 1)
         yield Chunk.from_columns(f"/episode/{name}", when, rr.Scalars.columns(scalars=values))
     facts = {**asdict(episode.setting), **{name: getattr(episode, name) for name in ENDS}}
-    facts |= {"steps": steps, "episode_return": episode.score, "outcome": layout.outcome(episode)}
+    facts |= {"steps": steps, "episode_return": episode.score, "outcome": blueprint.outcome(episode)}
     yield Chunk.from_property("episode", rr.AnyValues(**_values(facts)))
     if properties:
         yield Chunk.from_property("run", rr.AnyValues(**_values(properties)))
-    yield layout.card(episode, properties)
-    yield from layout.signals(episode.states)
+    yield blueprint.card(episode, properties)
+    yield from blueprint.signals(episode.states)
 
 
 def _values(properties: Mapping[str, Value]) -> dict[str, pa.Array]:

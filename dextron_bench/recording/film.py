@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from dextron_bench.world import model
-from dextron_bench.world.rendering import renderer as appearance
+from dextron_bench.world.rendering import renderer
 
 RATES = {".mp4": 1.0 / model.CONTROL_STEP, ".gif": 25.0}  # [1/s] pictures at most; many viewers slow quicker GIFs down.
 TICK = 10  # [ms] in which a GIF counts.
@@ -51,8 +51,8 @@ class Look:
                 )
         if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
             raise BadLook(f"speed {self.speed:g}: choose from {SPEEDS[0]:g} to {SPEEDS[1]:g} times life's")
-        if self.camera not in appearance.CAMERAS:
-            raise appearance.UnknownCamera(self.camera)
+        if self.camera not in renderer.CAMERAS:
+            raise renderer.UnknownCamera(self.camera)
 
 
 def steps(count: int, rate: float, speed: float) -> tuple[list[int], float]:
@@ -89,9 +89,9 @@ def gif(file: Path, states: np.ndarray, look: Look, report: Report) -> None:
 
 
 def _pictures(states: np.ndarray, look: Look, report: Report = lambda done, total: None) -> Iterator[np.ndarray]:
-    with appearance.Painter(look.width, look.height, supersampling=1) as painter:
+    with renderer.Painter(look.width, look.height, supersampling=1) as painter:
         for done, state in enumerate(states, start=1):
-            yield painter.paint(state, appearance.CAMERAS[look.camera])
+            yield painter.paint(state, renderer.CAMERAS[look.camera])
             report(done, len(states))
 
 

@@ -9,9 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 
-from dextron_bench.recording import blueprint as layout
-from dextron_bench.recording import rrd_file as storage
-from dextron_bench.recording import scene
+from dextron_bench.recording import blueprint, rrd_file, scene
 from dextron_bench.recording.episode_file import Recorded
 from dextron_bench.recording.summaries import PAIR, read_safely
 
@@ -46,7 +44,7 @@ def pair(file: Path, first: Path, second: Path) -> Path:
         chunks += _moved(each, side)
         chunks += _lines(side)
     names = [f"{side[1:].upper()}: {_name(recorded)}" for side, recorded in zip(SIDES, sides, strict=True)]
-    storage.save(file, chunks, ", ".join(names), _blueprint(names), storage.PAIRS)
+    rrd_file.save(file, chunks, ", ".join(names), _blueprint(names), rrd_file.PAIRS)
     return file
 
 
@@ -59,13 +57,13 @@ def _moved(file: Path, side: str) -> Iterable[Chunk]:
     """What a recording shows, below the side's own root, without names of lines."""
     for chunk in RrdReader(file).store().stream().to_chunks():
         entity = str(chunk.entity_path)
-        if not entity.startswith("/__") and not (chunk.is_static and entity in layout.LINES):
+        if not entity.startswith("/__") and not (chunk.is_static and entity in blueprint.LINES):
             yield chunk.with_entity_path(side + entity)
 
 
 def _lines(side: str) -> Iterable[Chunk]:
     """Lines named after their side; the second side's are paler."""
-    for entity, looks in layout.LINES.items():
+    for entity, looks in blueprint.LINES.items():
         shown = [not (side == SIDES[1] and label.startswith(SHARED)) for label in looks]
         colours = [tuple(part // 2 + 110 for part in c) if side == SIDES[1] else c for c in looks.values()]
         names = [f"{side[1:].upper()}: {label}" for label in looks]
@@ -77,7 +75,7 @@ def _blueprint(names: list[str]) -> rrb.Blueprint:
     """A column for each side, and one in which their lines are together."""
     columns = [
         rrb.Vertical(
-            layout.space(side, name), rrb.TextDocumentView(origin=f"{side}/card", name=name), row_shares=[3, 1]
+            blueprint.space(side, name), rrb.TextDocumentView(origin=f"{side}/card", name=name), row_shares=[3, 1]
         )
         for side, name in zip(SIDES, names, strict=True)
     ]
@@ -89,4 +87,4 @@ def _blueprint(names: list[str]) -> rrb.Blueprint:
         )
         for title, (entities, span) in PLOTS.items()
     ]
-    return layout.page(rrb.Horizontal(*columns, rrb.Vertical(*plots), column_shares=[4, 4, 5]))
+    return blueprint.page(rrb.Horizontal(*columns, rrb.Vertical(*plots), column_shares=[4, 4, 5]))

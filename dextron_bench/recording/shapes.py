@@ -16,7 +16,7 @@ import numpy as np
 import rerun as rr
 
 from dextron_bench.reaches import rotation
-from dextron_bench.world.rendering import visuals as dressing
+from dextron_bench.world.rendering import visuals
 
 XYZW = [1, 2, 3, 0]  # Rerun puts the scalar part of a quaternion last.
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
@@ -38,7 +38,7 @@ class Shape:
 
     def fixed(self, geoms: np.ndarray) -> rr.AsComponents:
         """Shapes (G,) where they are in their body's frame."""
-        places = {self.place: origins(geoms), "quaternions": dressing.dressed().geom_quat[geoms][:, XYZW]}
+        places = {self.place: origins(geoms), "quaternions": visuals.visual_model().geom_quat[geoms][:, XYZW]}
         return self.archetype.from_fields(**self._look(geoms), **places)
 
     def moves(self, positions: np.ndarray, quaternions: np.ndarray) -> rr.ComponentColumnList:
@@ -48,7 +48,7 @@ class Shape:
         return self.archetype.columns(**places).partition([count] * steps)
 
     def _look(self, geoms: np.ndarray) -> dict[str, Any]:
-        return {**self.sizes(dressing.dressed().geom_size[geoms]), "colors": _colours(geoms), "fill_mode": "solid"}
+        return {**self.sizes(visuals.visual_model().geom_size[geoms]), "colors": _colours(geoms), "fill_mode": "solid"}
 
 
 def _long(size: np.ndarray) -> dict[str, np.ndarray]:
@@ -67,7 +67,7 @@ SIMPLE = {
 @cache
 def bodies() -> Mapping[int, Kinds]:
     """What is shown of the bodies that have meshes, and of the world, body 0; each moves as a whole."""
-    drawn = dressing.dressed()
+    drawn = visuals.visual_model()
     whole = np.unique([0, *drawn.geom_bodyid[drawn.geom_type == MESH]])
     return {int(body): _kinds(drawn.geom_bodyid == body) for body in whole}
 
@@ -99,7 +99,7 @@ class Parts:
 @cache
 def fingers() -> tuple[Parts, ...]:
     """What is shown of all other bodies, which are the fingers', by kind."""
-    drawn = dressing.dressed()
+    drawn = visuals.visual_model()
     kinds = _kinds(~np.isin(drawn.geom_bodyid, list(bodies())))
     return tuple(
         Parts(SIMPLE[kind], geoms, drawn.geom_bodyid[geoms], origins(geoms), drawn.geom_quat[geoms])
@@ -114,7 +114,7 @@ def fixed(kind: int, geoms: np.ndarray) -> rr.AsComponents:
 
 def origins(geoms: np.ndarray) -> np.ndarray:
     """What Rerun moves shapes (G,) by, in their body's frame, (G, 3): their centre, of a capsule its start."""
-    drawn = dressing.dressed()
+    drawn = visuals.visual_model()
     half = np.where(drawn.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE, drawn.geom_size[geoms, 1], 0.0)
     up = rotation.rotate(drawn.geom_quat[geoms], np.array([0.0, 0.0, 1.0]))
     return drawn.geom_pos[geoms] - up * half[:, None]
@@ -122,19 +122,19 @@ def origins(geoms: np.ndarray) -> np.ndarray:
 
 def _kinds(among: np.ndarray) -> Kinds:
     """Those of all shapes (G,) that are marked and shown, by kind."""
-    drawn = dressing.dressed()
-    geoms = np.flatnonzero(among & (drawn.geom_group == dressing.SHOWN))
+    drawn = visuals.visual_model()
+    geoms = np.flatnonzero(among & (drawn.geom_group == visuals.SHOWN))
     return {int(kind): geoms[drawn.geom_type[geoms] == kind] for kind in np.unique(drawn.geom_type[geoms])}
 
 
 def _colours(geoms: np.ndarray) -> np.ndarray:
-    drawn = dressing.dressed()
+    drawn = visuals.visual_model()
     return np.round(drawn.mat_rgba[drawn.geom_matid[geoms]] * 255).astype(np.uint8)
 
 
 def _mesh(geoms: np.ndarray) -> rr.Mesh3D:
     """Meshes as one in their body's frame, since an entity has but one."""
-    drawn = dressing.dressed()
+    drawn = visuals.visual_model()
     vertices, normals, faces, colours = [], [], [], []
     for geom, colour in zip(geoms, _colours(geoms), strict=True):
         mesh = drawn.geom_dataid[geom]

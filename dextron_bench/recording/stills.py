@@ -13,7 +13,7 @@ from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.world import model
-from dextron_bench.world.rendering import renderer as appearance
+from dextron_bench.world.rendering import renderer
 
 EXPERT = Expert(gain=2.0, critical=0.15)  # Succeeds in the minimum-jerk world (Sharif et al., 2020).
 CLOSURES = (0.0, model.HALF_CLOSED, 1.0)
@@ -26,9 +26,9 @@ def write_pictures(folder: Path) -> list[Path]:
     """Writes hero.png and hand-open-half-closed.png to `folder`; returns their paths. Raises NoGraphics."""
     folder.mkdir(parents=True, exist_ok=True)
     lifted = lift().states[-BEFORE_END]
-    hands = [appearance.render(hand(lifted, closure), 426, 320, "hand", LAMPS) for closure in CLOSURES]
+    hands = [renderer.render(hand(lifted, closure), 426, 320, "hand", LAMPS) for closure in CLOSURES]
     pictures = {
-        "hero.png": appearance.render(lifted, 1280, 720, "hero", LAMPS),
+        "hero.png": renderer.render(lifted, 1280, 720, "hero", LAMPS),
         "hand-open-half-closed.png": np.concatenate(hands, axis=1),
     }
     for name, picture in pictures.items():

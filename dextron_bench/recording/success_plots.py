@@ -10,7 +10,7 @@ import rerun as rr
 from rerun.chunk import Chunk
 from rerun.encodings import TensorDataBatch
 
-from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.recording import scene
 
 RIDGES = 40  # Curves of the ridge plot, about.
@@ -21,7 +21,7 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # Of the reach's duration, at which the ri
 THRESHOLD = 0.5  # A chance above it foretells success.
 
 
-def chunks(insight: Insight, actions: np.ndarray, first: int = 0) -> Iterable[Chunk]:
+def chunks(insight: StepPredictions, actions: np.ndarray, first: int = 0) -> Iterable[Chunk]:
     """What changes with the cursor, for the actions (T, 1) that were taken from step `first` on."""
     steps = len(insight.chances)
     when = scene.timelines(first, first + steps - 1)
@@ -33,7 +33,7 @@ def chunks(insight: Insight, actions: np.ndarray, first: int = 0) -> Iterable[Ch
     yield Chunk.from_columns("/success/chosen", when, chosen)
 
 
-def ridge(insight: Insight, actions: np.ndarray, last: int, success: bool | None = None) -> Iterable[Chunk]:
+def ridge(insight: StepPredictions, actions: np.ndarray, last: int, success: bool | None = None) -> Iterable[Chunk]:
     """The curves of an episode that ends at step `last`, one above the other, later ones higher; actions are (T,).
 
     They are green where the outcome is foretold, red where it is not, and blue while it is not known. After them come

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.recording import reader_process as glance
+from dextron_bench.recording import reader_process
 from dextron_bench.recording.episode_file import ENDS, BrokenRecording, Recorded, Value, read
 from dextron_bench.recording.rrd_file import APPLICATION, APPLICATIONS
 
@@ -108,7 +108,7 @@ def _form(file: Path) -> str:
 
 def _told(files: Sequence[Path], whole: bool) -> Iterator[dict[str, Any]]:
     """What `glance` tells of each file; where one ends its process, another goes on with the next file."""
-    command = [sys.executable, "-P", glance.__file__, *(["whole"] if whole else [])]
+    command = [sys.executable, "-P", reader_process.__file__, *(["whole"] if whole else [])]
     while files:
         names = "".join(json.dumps(str(file)) + "\n" for file in files)
         done = subprocess.run(command, input=names, capture_output=True, text=True, encoding="utf-8", check=False)

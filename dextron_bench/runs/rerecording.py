@@ -14,9 +14,8 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import from_frame
-from dextron_bench.runs import run_files as records
-from dextron_bench.runs import selection as gallery
-from dextron_bench.splits import loading as splits
+from dextron_bench.runs import recording_files, run_files, selection
+from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import atomic
 from dextron_bench.world import model
 
@@ -33,7 +32,7 @@ def restore(picked: pd.DataFrame, report: Report = lambda done, total: None) -> 
     Raises Unplayable, UnwritableRecording, MissingData, UnknownSplit.
     """
     rows = picked.to_dict("records")
-    files = [records.recording_file(Path(row["folder"]), row["split"], row["row"]) for row in rows]
+    files = [recording_files.recording_file(Path(row["folder"]), row["split"], row["row"]) for row in rows]
     wrong = _wrong(files, rows)
     missing = picked[[bool(why) for why in wrong]]
     for row, why in zip(rows, wrong, strict=True):
@@ -69,12 +68,12 @@ def _check_playable(row: dict[Any, Any], why: str) -> None:
     if not hasattr(row.get("actions"), "__len__"):
         told = "has no recording" if why == "missing" else f"has a recording that {why}"
         raise Unplayable(
-            f"{called} {told}, and its actions were not kept; remove {folder / records.EPISODES} and {again}: "
+            f"{called} {told}, and its actions were not kept; remove {folder / run_files.EPISODES} and {again}: "
             "episodes are played again, nothing is trained"
         )
-    if atomic.read_json(folder / records.CONFIG).get("physics") != model.mjcf_hash():
+    if atomic.read_json(folder / run_files.CONFIG).get("physics") != model.mjcf_hash():
         raise Unplayable(f"{called} was played with other physics than this version's; remove {folder} and {again}")
-    if splits.load(row["reaches"], row["split"]).digest != row["digest"]:
+    if load_split(row["reaches"], row["split"]).digest != row["digest"]:
         raise Unplayable(f"{called} is of a version of the split that is no more; {again}")
 
 
@@ -82,11 +81,11 @@ def _record(group: pd.DataFrame) -> Iterator[Path]:
     """Plays the episodes of one run on one split again, and records them."""
     rows = group.to_dict("records")
     folder, name = Path(rows[0]["folder"]), rows[0]["reaches"]
-    source, split, about = sources.open_source(name), splits.load(name, rows[0]["split"]), gallery.whose(folder)
+    source, split, about = sources.open_source(name), load_split(name, rows[0]["split"]), selection.run_identity(folder)
     for place, episode in replay(source, from_frame(group), group["actions"].tolist()):
         row = rows[place]
-        records.record(folder, source, split, row["row"], _same(row, episode), about)
-        yield records.recording_file(folder, split.name, row["row"])
+        recording_files.record(folder, source, split, row["row"], _same(row, episode), about)
+        yield recording_files.recording_file(folder, split.name, row["row"])
 
 
 def _same(row: dict[Any, Any], episode: Episode) -> Episode:

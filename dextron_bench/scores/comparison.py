@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from dextron_bench.runs.result_files import Side
+from dextron_bench.runs.result_files import Results, _listed
 from dextron_bench.scores import paired
 from dextron_bench.splits import strata
 from dextron_bench.world import task
@@ -25,8 +25,8 @@ class Comparison:
     subject and for each start region: `group`, `rows`, mean returns `a` and `b`, `difference`, `low`, `high`.
     """
 
-    a: Side
-    b: Side
+    a: SeedScores
+    b: SeedScores
     score: paired.Difference
     success: paired.Difference
     p_value: float
@@ -34,7 +34,7 @@ class Comparison:
     groups: pd.DataFrame
 
 
-def compare(a: Side, b: Side) -> Comparison:
+def compare(a: SeedScores, b: SeedScores) -> Comparison:
     """Compares two sides that `sides.pair` made; raises DamagedSplit."""
     rows = strata.shipped(a.reaches, a.split, a.digest)
     solved = [side.scores == task.SUCCESS for side in (a, b)]
@@ -68,3 +68,60 @@ def _groups(a: np.ndarray, b: np.ndarray, rows: pd.DataFrame | None) -> Iterator
         means = {"a": float(a[:, own].mean()), "b": float(b[:, own].mean())}
         interval = {"difference": found.mean, "low": found.low, "high": found.high}
         yield {"group": name, "rows": len(own), **means, **interval}
+
+
+class Incomparable(ValueError):
+    """Results that were not scored on the same settings."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeedScores:
+    """Scores (seeds, settings) of one method on the split of a source's reaches that has this digest."""
+
+    name: str
+    reaches: str
+    split: str
+    digest: str
+    scores: np.ndarray
+
+
+def align(
+    names: tuple[str, str], results: tuple[Results, Results], split: str, reaches: str | None
+) -> tuple[SeedScores, SeedScores]:
+    """A and B on the same settings; `reaches` may be None where there is one source that both played.
+
+    Raises Incomparable.
+    """
+    source = _shared([{result["reaches"] for result in each} for each in results], reaches)
+    a, b = (_side(name, each, source, split) for name, each in zip(names, results, strict=True))
+    if (a.digest, a.scores.shape[1]) != (b.digest, b.scores.shape[1]):
+        raise Incomparable(
+            f"{a.name} and {b.name} played other versions of {split} of {source} reaches, "
+            f"{a.digest[:8]} and {b.digest[:8]}; run the older one again"
+        )
+    return a, b
+
+
+def _side(name: str, results: Results, reaches: str, split: str) -> SeedScores:
+    own = [result for result in results if result["reaches"] == reaches]
+    if lacking := [result for result in own if split not in result["splits"]]:
+        raise Incomparable(
+            f"{name}, seed {lacking[0]['seed']}, has no split {split!r} of {reaches} reaches; "
+            f"it has {_listed(lacking[0]['splits'])}"
+        )
+    seeds = [result["splits"][split] for result in own]
+    if len({(found["digest"], len(found["scores"])) for found in seeds}) > 1:
+        raise Incomparable(f"seeds of {name} played other versions of {split} of {reaches} reaches; run them again")
+    return SeedScores(name, reaches, split, seeds[0]["digest"], np.array([found["scores"] for found in seeds], float))
+
+
+def _shared(played: Sequence[set[str]], asked: str | None) -> str:
+    """The source of reaches that both sides played."""
+    both = played[0] & played[1]
+    if not both:
+        raise Incomparable(f"A has results on {_listed(played[0])} reaches, B on {_listed(played[1])}: none in common")
+    if asked is None and len(both) > 1:
+        raise Incomparable(f"both have results on {_listed(both)} reaches; choose with --reaches")
+    if asked is not None and asked not in both:
+        raise Incomparable(f"both have results on {_listed(both)} reaches, not both on {asked}")
+    return asked or next(iter(both))

@@ -18,7 +18,7 @@ from dextron_bench.reaches.setting import Setting, Source, Stratum, from_frame
 
 if TYPE_CHECKING:
     from dextron_bench.scores.comparison import Comparison
-    from dextron_bench.success.exemplars import Foresight
+    from dextron_bench.success.exemplars import PredictedEpisode
 
 RIDGES = 40  # Curves of an episode, about.
 FORMATS = (".pdf", ".png", ".svg")
@@ -130,7 +130,7 @@ def success_curve(points: list[dict[str, float]], file: Path) -> None:
     _save(figure, file, 150)
 
 
-def ridges(episodes: dict[str, Foresight], file: Path) -> None:
+def ridges(episodes: dict[str, PredictedEpisode], file: Path) -> None:
     """Draws what the success model thinks of every action, some RIDGES curves an episode, for titled ones (Fig. 5).
 
     Time, as a share of the reach, goes up; a tick marks the action that was chosen. Green curves foretell the outcome,

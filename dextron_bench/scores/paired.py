@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binomtest, norm
 
-from dextron_bench.scores import statistics as stats
+from dextron_bench.scores import statistics
 
 POWER = 0.8  # Chance with which a difference of the size `detectable` shows.
 
 
 @dataclass(frozen=True, slots=True)
-class Difference(stats.Estimate):
+class Difference(statistics.Estimate):
     """What B scores more than A, with its 95 % interval, and the smallest difference that would be told from none."""
 
     detectable: float
@@ -46,11 +46,11 @@ def difference(a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> Differ
     Each resample draws settings once, for both, and seeds for each method by itself. Equal generators give
     opposite differences for (a, b) and (b, a).
     """
-    settings = stats.drawn(a.shape[1], rng)
+    settings = statistics.drawn(a.shape[1], rng)
     swap = b.tobytes() < a.tobytes()  # Seeds are drawn in an order that does not hang on which is called A.
-    first, second = (stats.resampled(scores, settings, rng) for scores in ((b, a) if swap else (a, b)))
+    first, second = (statistics.resampled(scores, settings, rng) for scores in ((b, a) if swap else (a, b)))
     resamples = first - second if swap else second - first
-    found = stats.interval(float(b.mean() - a.mean()), resamples)
+    found = statistics.interval(float(b.mean() - a.mean()), resamples)
     return Difference(found.mean, found.low, found.high, detectable(resamples))
 
 
@@ -64,7 +64,7 @@ def detectable(resamples: np.ndarray) -> float:
 
     That is 2.8 standard errors; `resamples` (RESAMPLES,) are of the difference.
     """
-    return float((norm.ppf(1.0 - stats.TAIL) + norm.ppf(POWER)) * resamples.std())
+    return float((norm.ppf(1.0 - statistics.TAIL) + norm.ppf(POWER)) * resamples.std())
 
 
 def flips(a: np.ndarray, b: np.ndarray) -> Flips:

@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
-from dextron_bench.methods import registry as methods
-from dextron_bench.scores import paired
-from dextron_bench.scores import statistics as stats
+from dextron_bench.methods import registry
+from dextron_bench.scores import paired, statistics
 from dextron_bench.splits import strata
 from dextron_bench.world import task
 
@@ -45,7 +44,7 @@ def table(results: Iterable[dict[str, Any]]) -> pd.DataFrame:
 
 def is_entrant(method: str, reaches: str) -> bool:
     """Whether a method is ranked: not the ceiling, which is told each setting's expert, and not in SIM's own world."""
-    return method not in methods.CEILINGS and reaches in CONTESTED
+    return method not in registry.CEILINGS and reaches in CONTESTED
 
 
 def _boards(results: Iterable[dict[str, Any]]) -> dict[tuple[str, str, str], Board]:
@@ -64,20 +63,26 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
     if len(lengths) > 1:
         raise UnevenResults(f"results on {split} of {reaches}, version {digest[:8]}, differ in their number of rows")
     scores = {method: np.array([found["scores"] for found in seeds], float) for method, seeds in board.items()}
-    settings = stats.drawn(lengths.pop(), np.random.default_rng(0))
-    resamples = {method: stats.resampled(each, settings, _stream(method)) for method, each in scores.items()}
+    settings = statistics.drawn(lengths.pop(), np.random.default_rng(0))
+    resamples = {method: statistics.resampled(each, settings, _stream(method)) for method, each in scores.items()}
     entrants = [method for method in scores if is_entrant(method, reaches)]
     ranks = dict(zip(entrants, paired.ranks([scores[method] for method in entrants]), strict=True))
     regions = strata.regions(reaches, split, digest)
-    ceiling = next((scores[method].mean() for method in methods.CEILINGS if method in scores), np.nan)
+    ceiling = next((scores[method].mean() for method in registry.CEILINGS if method in scores), np.nan)
     for method, each in scores.items():
         solved = np.equal(each, task.SUCCESS).astype(float)
         yield {
             **dict(zip(("reaches", "split", "version"), (reaches, split, digest[:8]), strict=True)),
             **{"rank": ranks.get(method, np.nan), "method": method, "seeds": len(each), "episodes": each.size},
-            **_spread("return", stats.interval(float(each.mean()), resamples[method])),
-            **_spread("success", stats.interval(solved.mean(), stats.resampled(solved, settings, _stream(method)))),
-            **(_spread("iqm", stats.interquartile_mean(each, regions, _stream(method))) if regions is not None else {}),
+            **_spread("return", statistics.interval(float(each.mean()), resamples[method])),
+            **_spread(
+                "success", statistics.interval(solved.mean(), statistics.resampled(solved, settings, _stream(method)))
+            ),
+            **(
+                _spread("iqm", statistics.interquartile_mean(each, regions, _stream(method)))
+                if regions is not None
+                else {}
+            ),
             "regret": ceiling - each.mean(),
             **_endings(board[method]),
         }
@@ -88,7 +93,7 @@ def _stream(method: str) -> np.random.Generator:
     return np.random.default_rng([0, *method.encode()])
 
 
-def _spread(name: str, found: stats.Estimate) -> dict[str, float]:
+def _spread(name: str, found: statistics.Estimate) -> dict[str, float]:
     return {name: found.mean, f"{name}_low": found.low, f"{name}_high": found.high}
 
 

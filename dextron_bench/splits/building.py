@@ -11,17 +11,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import branching as opening
-from dextron_bench.experts import policies as experts
+from dextron_bench.experts import branching, policies
 from dextron_bench.reaches import setting
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import SPLIT_NAMES, split_digest
 from dextron_bench.storage import atomic
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
 
 NEAR_OFFSET = 0.001  # [m] settings of one reach whose offsets differ by less than this in x and y
 NEAR_NOISE = 0.02  # and whose duration noise differs by less than this are near-equal.
-RANGE = experts.CRITICAL_DISTANCE[1] - experts.CRITICAL_DISTANCE[0]  # Width of the range of d_c.
+RANGE = policies.CRITICAL_DISTANCE[1] - policies.CRITICAL_DISTANCE[0]  # Width of the range of d_c.
 SETTING = ["reach", "offset_x", "offset_y", "duration_noise"]
 COLUMNS = ["split", *SETTING, "gain", "critical", "window"]
 
@@ -89,7 +88,7 @@ def draw_open(source: setting.Source, parts: Iterable[pd.DataFrame], seed: int, 
     """Uniform settings and gains, solvable or not, near-equal to none of the other parts, with no d_c yet."""
     rng = np.random.default_rng([seed, 0, 2])
     count = 2 * sizes.open
-    rows = setting.to_frame([source.sample(rng) for _ in range(count)]).assign(gain=rng.uniform(*experts.GAIN, count))
+    rows = setting.to_frame([source.sample(rng) for _ in range(count)]).assign(gain=rng.uniform(*policies.GAIN, count))
     return without_near(rows, pd.concat(parts)).head(sizes.open)
 
 
@@ -97,16 +96,16 @@ def scan(source: setting.Source, rows: pd.DataFrame, engine: Engine, points: int
     """Sums of rewards (rows, points) of experts with each row's gain and evenly spaced d_c (see `grid`)."""
     criticals = grid(points)
     paths = (source.path(case) for case in setting.from_frame(rows))
-    asked = (opening.Question(p, gain, criticals) for p, gain in zip(paths, rows["gain"], strict=True))
+    asked = (branching.ExpertBatch(p, gain, criticals) for p, gain in zip(paths, rows["gain"], strict=True))
     scores = np.zeros((len(rows), points))
-    for number, found in opening.answer(engine, asked):
+    for number, found in branching.play(engine, asked):
         scores[number] = found.returns
     return scores
 
 
 def grid(points: int) -> np.ndarray:
     """The middles of equal bands of d_c."""
-    return experts.CRITICAL_DISTANCE[0] + RANGE * (np.arange(points) + 0.5) / points
+    return policies.CRITICAL_DISTANCE[0] + RANGE * (np.arange(points) + 0.5) / points
 
 
 def window(scores: np.ndarray) -> np.ndarray:
@@ -136,7 +135,7 @@ def build(
     sizes = sizes or Sizes()
     parts = partition(source, database, seed, sizes, by_subject=source.name == "real")
     parts["open"] = draw_open(source, parts.values(), seed, sizes)
-    tables = [scanned(source, name, parts[name], engine, sizes.scan) for name in splits.NAMES[1:] if name in parts]
+    tables = [scanned(source, name, parts[name], engine, sizes.scan) for name in SPLIT_NAMES[1:] if name in parts]
     solved = parts["train"].groupby(SETTING)["score"].transform("size").to_numpy()
     tables.insert(0, parts["train"].assign(window=RANGE * solved / tried, split="train")[COLUMNS])
     return write(source.name, pd.concat(tables, ignore_index=True), folder)
@@ -146,7 +145,7 @@ def write(reaches: str, table: pd.DataFrame, folder: Path) -> dict[str, dict[str
     """Writes a source's splits, one after another in `table`, into `folder`; returns their entry in its catalogue."""
     atomic.write_atomically(folder / f"splits-{reaches}.parquet", lambda part: table.to_parquet(part))
     entry = {
-        str(name): {"rows": len(rows), "digest": splits.digest(rows)}
+        str(name): {"rows": len(rows), "digest": split_digest(rows)}
         for name, rows in table.groupby("split", sort=False)
     }
     catalogue = folder / "splits.json"

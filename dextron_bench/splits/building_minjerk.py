@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import branching as opening
+from dextron_bench.experts import branching
 from dextron_bench.experts.policies import Expert
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import REACHES, MinjerkSource
-from dextron_bench.splits import building as partition
+from dextron_bench.splits import building
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
 
@@ -44,8 +44,8 @@ def build(folder: Path, engine: Engine, seed: int = 0, sizes: Sizes | None = Non
     sizes = sizes or Sizes()
     source = MinjerkSource()
     parts = draw(source, engine, seed, sizes)
-    tables = [partition.scanned(source, name, rows, engine, sizes.scan) for name, rows in parts.items()]
-    return partition.write(source.name, pd.concat(tables, ignore_index=True), folder)
+    tables = [building.scanned(source, name, rows, engine, sizes.scan) for name, rows in parts.items()]
+    return building.write(source.name, pd.concat(tables, ignore_index=True), folder)
 
 
 def draw(source: MinjerkSource, engine: Engine, seed: int, sizes: Sizes) -> dict[str, pd.DataFrame]:
@@ -64,12 +64,12 @@ def solved(source: MinjerkSource, numbers: np.ndarray, count: int, engine: Engin
         found += _solved([setting.Setting(f"minjerk-{number:06d}", 0.0, 0.0, 0.0) for number in tried], source, engine)
         if len(found) >= count:
             return setting.to_frame(found[:count]).assign(gain=EXPERT.gain, critical=EXPERT.critical)
-    raise partition.TooFewRows(f"{count} solved minjerk reaches are asked for and there are {len(found)}")
+    raise building.TooFewRows(f"{count} solved minjerk reaches are asked for and there are {len(found)}")
 
 
 def _solved(tried: list[setting.Setting], source: MinjerkSource, engine: Engine) -> Iterator[setting.Setting]:
     """Those settings in which EXPERT scores 20, in their order."""
     criticals = np.array([EXPERT.critical])
-    asked = (opening.Question(source.path(each), EXPERT.gain, criticals) for each in tried)
-    returns = {number: answer.returns[0] for number, answer in opening.answer(engine, asked)}
+    asked = (branching.ExpertBatch(source.path(each), EXPERT.gain, criticals) for each in tried)
+    returns = {number: answer.returns[0] for number, answer in branching.play(engine, asked)}
     yield from (each for number, each in enumerate(tried) if returns[number] == task.SUCCESS)

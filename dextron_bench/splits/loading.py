@@ -17,7 +17,7 @@ from dextron_bench.reaches import setting
 from dextron_bench.storage import hashing
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
-NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "open")
+SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "open")
 EVALUATED = ("test", "unseen-reach", "unseen-subject")
 
 
@@ -56,42 +56,42 @@ class Split:
         return self.cases[row]
 
 
-def known(reaches: str) -> tuple[str, ...]:
+def known_splits(reaches: str) -> tuple[str, ...]:
     """Names of the splits that ship for a source of reaches."""
-    return tuple(name for name in NAMES if name in _catalogue().get(reaches, {}))
+    return tuple(name for name in SPLIT_NAMES if name in _catalogue().get(reaches, {}))
 
 
-def evaluated(reaches: str) -> tuple[str, ...]:
+def ranking_splits(reaches: str) -> tuple[str, ...]:
     """Names of the shipped splits that rank methods; raises UnknownSplit where there are none."""
-    found = tuple(name for name in known(reaches) if name in EVALUATED)
+    found = tuple(name for name in known_splits(reaches) if name in EVALUATED)
     if not found:
-        raise UnknownSplit(EVALUATED[0], reaches, known(reaches))
+        raise UnknownSplit(EVALUATED[0], reaches, known_splits(reaches))
     return found
 
 
-def everything() -> list[tuple[str, str]]:
+def all_splits() -> list[tuple[str, str]]:
     """Every shipped split, as (source of reaches, name)."""
-    return [(reaches, name) for reaches in _catalogue() for name in known(reaches)]
+    return [(reaches, name) for reaches in _catalogue() for name in known_splits(reaches)]
 
 
-def load(reaches: str, name: str) -> Split:
+def load_split(reaches: str, name: str) -> Split:
     """The split of that name; raises UnknownSplit, DamagedSplit."""
-    if name not in known(reaches):
-        raise UnknownSplit(name, reaches, known(reaches))
+    if name not in known_splits(reaches):
+        raise UnknownSplit(name, reaches, known_splits(reaches))
     table = _table(reaches)
     try:
         rows = table[table["split"] == name]
-        found, frozen = digest(rows), _catalogue()[reaches][name]["digest"]
+        found, frozen = split_digest(rows), _catalogue()[reaches][name]["digest"]
     except (KeyError, ValueError, TypeError) as error:
         raise DamagedSplit(f"the splits of {reaches!r} reaches lack {error}; reinstall the package") from error
     if found != frozen:
         raise DamagedSplit(
             f"split {name!r} of {reaches!r} reaches is damaged (hash {found[:12]}); reinstall the package"
         )
-    return Split(name, reaches, tuple(cases(rows)), found)
+    return Split(name, reaches, tuple(cases_from_frame(rows)), found)
 
 
-def cases(rows: pd.DataFrame) -> list[Case]:
+def cases_from_frame(rows: pd.DataFrame) -> list[Case]:
     """The cases of a table with the columns of a setting, `gain`, `critical` and `window`."""
     experts = zip(rows["gain"], rows["critical"], rows["window"], strict=True)
     return [
@@ -100,7 +100,7 @@ def cases(rows: pd.DataFrame) -> list[Case]:
     ]
 
 
-def digest(rows: pd.DataFrame) -> str:
+def split_digest(rows: pd.DataFrame) -> str:
     """SHA-256 of a split's rows in order: names as UTF-8, numbers as little-endian float64."""
     names = "\n".join(rows["reach"]).encode()
     return hashing.digest(names, *(np.ascontiguousarray(rows[c], "<f8").tobytes() for c in NUMBERS))

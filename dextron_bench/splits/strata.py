@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench.reaches import sources
-from dextron_bench.reaches.recorded import parsing as raw
-from dextron_bench.splits import loading as splits
-from dextron_bench.splits.loading import Split
+from dextron_bench.reaches.recorded import parsing
+from dextron_bench.splits.loading import Split, known_splits, load_split
 from dextron_bench.world import task
 
 SUBJECT, REGION = ("subject",), ("ring", "angle")  # What `by_stratum` groups by.
@@ -23,7 +22,7 @@ def strata(split: Split) -> pd.DataFrame:
     """
     names = [case.setting.reach for case in split.cases]
     if split.reaches == "real":
-        rows = [raw.origin(name) for name in names]
+        rows = [parsing.origin(name) for name in names]
     else:
         source = sources.open_source(split.reaches)
         found = [source.stratum(name) for name in names]
@@ -33,7 +32,7 @@ def strata(split: Split) -> pd.DataFrame:
 
 def shipped(reaches: str, name: str, digest: str) -> pd.DataFrame | None:
     """The strata of a shipped split's rows; None where no split of that name and digest ships. Raises DamagedSplit."""
-    if name not in splits.known(reaches) or (split := splits.load(reaches, name)).digest != digest:
+    if name not in known_splits(reaches) or (split := load_split(reaches, name)).digest != digest:
         return None
     return strata(split)
 

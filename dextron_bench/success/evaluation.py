@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.rollout import Agent, rollout
-from dextron_bench.experts import policies as experts
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts import policies
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
-from dextron_bench.success import metrics as judgement
-from dextron_bench.success.metrics import Judgement
+from dextron_bench.success import metrics
+from dextron_bench.success.metrics import Metrics
 from dextron_bench.success.network import SuccessModel
-from dextron_bench.world import model as world
+from dextron_bench.world import model as world_model
 
 PARTS = 10  # Of a reach, in each of which the AUC is told; what comes after its end is one more.
 
@@ -25,7 +26,7 @@ PARTS = 10  # Of a reach, in each of which the AUC is told; what comes after its
 class Evaluation:
     """The judgement of all transitions, and the AUC (PARTS + 1,) in each tenth of the reach, and after it."""
 
-    overall: Judgement
+    overall: Metrics
     auc_by_time: np.ndarray
     calibration: tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -39,7 +40,7 @@ class Evaluation:
 def contrasted(cases: Sequence[Case], seed: int = 0) -> list[Case]:
     """Every case twice: with the expert that solves it, and with one drawn uniformly, so that outcomes differ."""
     rng = np.random.default_rng([seed, len(cases)])
-    gains, criticals = (rng.uniform(*bounds, len(cases)) for bounds in (experts.GAIN, experts.CRITICAL_DISTANCE))
+    gains, criticals = (rng.uniform(*bounds, len(cases)) for bounds in (policies.GAIN, policies.CRITICAL_DISTANCE))
     drawn = [Expert(gain, critical) for gain, critical in zip(gains.tolist(), criticals.tolist(), strict=True)]
     return [*cases, *(replace(case, expert=expert) for case, expert in zip(cases, drawn, strict=True))]
 
@@ -51,8 +52,8 @@ def evaluate(
     parts = [_foretold(model, source, episode) for episode in _played(source, cases, agent, threads)]
     chances, outcomes, times = (np.concatenate(column) for column in zip(*parts, strict=True))
     of = np.minimum((times * PARTS).astype(int), PARTS)
-    by_time = np.array([judgement.auc(chances[of == part], outcomes[of == part]) for part in range(PARTS + 1)])
-    return Evaluation(judgement.judge(chances, outcomes), by_time, judgement.calibration(chances, outcomes))
+    by_time = np.array([metrics.auc(chances[of == part], outcomes[of == part]) for part in range(PARTS + 1)])
+    return Evaluation(metrics.evaluate(chances, outcomes), by_time, metrics.calibration(chances, outcomes))
 
 
 def _plain(values: np.ndarray) -> list[float | None]:
@@ -68,5 +69,5 @@ def _played(source: Source, cases: Sequence[Case], agent: Agent | None, threads:
 def _foretold(model: SuccessModel, source: Source, episode: Episode) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Chances, outcomes and times, as a share of the reach's duration, of an episode's transitions, each (T,)."""
     chances = model.chance(episode.states[:-1], episode.actions[:, 0])
-    times = np.arange(len(chances)) * world.CONTROL_STEP / source.duration(episode.setting)
+    times = np.arange(len(chances)) * world_model.CONTROL_STEP / source.duration(episode.setting)
     return chances, np.full(len(chances), int(episode.success)), times

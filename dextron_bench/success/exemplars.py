@@ -9,13 +9,14 @@ import numpy as np
 
 from dextron_bench.evaluation.diagnosis import Diagnosis, diagnose
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.predictions import Insight
-from dextron_bench.evaluation.rollout import Agent, rollout
+from dextron_bench.evaluation.predictions import StepPredictions
+from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, ExpertAgent
+from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
+from dextron_bench.success import predict as step_predictions
 from dextron_bench.success.network import SuccessModel
-from dextron_bench.success.predict import look
-from dextron_bench.world import model as world
+from dextron_bench.world import model as world_model
 
 KINDS = {
     "fading": "hope that fades by wrong actions",
@@ -31,13 +32,13 @@ SHUT = 0.2  # It is shut where even the best has this chance at most.
 
 
 @dataclass(frozen=True, slots=True)
-class Foresight:
+class PredictedEpisode:
     """An episode as the model foretells it; `player` says who acts, "expert" or a policy's name."""
 
     player: str
     episode: Episode
     diagnosis: Diagnosis
-    insight: Insight
+    insight: StepPredictions
 
     @property
     def times(self) -> np.ndarray:
@@ -55,24 +56,26 @@ class Foresight:
         return float(self.right.mean())
 
 
-def foresee(model: SuccessModel, source: Source, case: Case, player: str, episode: Episode) -> Foresight:
+def predict(model: SuccessModel, source: Source, case: Case, player: str, episode: Episode) -> PredictedEpisode:
     """What the model thinks at each step of an episode of a case."""
-    return Foresight(player, episode, diagnose(episode, case), look(model, source, case, episode))
+    return PredictedEpisode(
+        player, episode, diagnose(episode, case), step_predictions.predict(model, source, case, episode)
+    )
 
 
 def foreseen(
     model: SuccessModel, source: Source, cases: Sequence[Case], policies: Mapping[str, Agent], threads: int = 0
-) -> Iterator[Foresight]:
+) -> Iterator[PredictedEpisode]:
     """Episodes of experts and of named policies on the same cases, as the model foretells them."""
     for player, agent in {EXPERT: ExpertAgent(), **policies}.items():
         played = dict(rollout(agent, source, cases, threads=threads))
         for row, case in enumerate(cases):
-            yield foresee(model, source, case, player, played[row])
+            yield predict(model, source, case, player, played[row])
 
 
-def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:
+def choose(seen: Iterable[PredictedEpisode]) -> dict[str, PredictedEpisode]:
     """The clearest episode of each of KINDS, those left out of which there is none."""
-    best: dict[str, tuple[float, Foresight]] = {}
+    best: dict[str, tuple[float, PredictedEpisode]] = {}
     for each in seen:
         for kind, score in _scores(each).items():
             if kind not in best or score > best[kind][0]:
@@ -80,7 +83,7 @@ def choose(seen: Iterable[Foresight]) -> dict[str, Foresight]:
     return {kind: best[kind][1] for kind in KINDS if kind in best}
 
 
-def _scores(seen: Foresight) -> dict[str, float]:
+def _scores(seen: PredictedEpisode) -> dict[str, float]:
     """How clear an episode is as the kind that it is, if it is any."""
     own, curves, chances = seen.player != EXPERT, seen.insight.curves, seen.insight.chances
     if own and not seen.episode.success:  # What experts do wrong explains no policy.
@@ -95,5 +98,5 @@ def _scores(seen: Foresight) -> dict[str, float]:
 
 def _fall(chances: np.ndarray) -> float:
     """The largest drop of chances (T,) within a quarter of a second."""
-    lag = min(int(0.25 / world.CONTROL_STEP), len(chances) - 1)
+    lag = min(int(0.25 / world_model.CONTROL_STEP), len(chances) - 1)
     return float((chances[:-lag] - chances[lag:]).max()) if lag else 0.0

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dextron_bench.evaluation.rollout import Agent, rollout
+from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import blocks
-from dextron_bench.experts import policies as experts
+from dextron_bench.experts import policies as experts_policies
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.storage import tensors
 from dextron_bench.success import dataset
@@ -81,7 +82,9 @@ def draw(source: Source, train: Sequence[Case], collection: Collection, number: 
     if collection.kind(number) != UNIFORM:
         return [train[row] for row in rng.integers(len(train), size=collection.block)]
     known = frozenset(case.setting.reach for case in train)
-    gains, criticals = (rng.uniform(*bounds, collection.block) for bounds in (experts.GAIN, experts.CRITICAL_DISTANCE))
+    gains, criticals = (
+        rng.uniform(*bounds, collection.block) for bounds in (experts_policies.GAIN, experts_policies.CRITICAL_DISTANCE)
+    )
     pairs = zip(gains.tolist(), criticals.tolist(), strict=True)
     return [Case(_sample(source, known, rng), Expert(gain, critical), 0.0) for gain, critical in pairs]
 

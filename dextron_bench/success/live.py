@@ -9,62 +9,45 @@ from typing import Protocol
 import numpy as np
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.predictions import Insight
-from dextron_bench.evaluation.rollout import Agent, Privileged, blaming, rollout
+from dextron_bench.evaluation.predictions import StepPredictions
+from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
-from dextron_bench.methods import registry as methods
-from dextron_bench.methods import weights
-from dextron_bench.methods.learners import Heir, Learner
+from dextron_bench.methods.agents import Agent, Privileged
 from dextron_bench.reaches.setting import Source
 from dextron_bench.success.network import GRID, SuccessModel
-from dextron_bench.world import model as world
+from dextron_bench.world import model as world_model
 
 
-class Audience(Protocol):
+class Observer(Protocol):
     """Is shown an episode so far after each step, and its end."""
 
-    def show(self, states: np.ndarray, actions: np.ndarray, insight: Insight) -> None:
+    def show(self, states: np.ndarray, actions: np.ndarray, insight: StepPredictions) -> None:
         """States (T, 48) that the agent has seen, what it did in them (T, 1), and what is thought of it."""
         ...
 
-    def close(self, actions: np.ndarray, insight: Insight, success: bool) -> None:
+    def close(self, actions: np.ndarray, insight: StepPredictions, success: bool) -> None:
         """All actions (T, 1) and thoughts, and the outcome."""
         ...
 
 
 def play(
-    agent: Agent, source: Source, case: Case, model: SuccessModel, audience: Audience, speed: float = 1.0
+    agent: Agent, source: Source, case: Case, model: SuccessModel, audience: Observer, speed: float = 1.0
 ) -> Episode:
     """Plays an episode before an audience, `speed` times as fast as life; 0 waits for nothing."""
-    duration = source.duration(case.setting) / world.CONTROL_STEP
-    watched = _Watched(agent, case.expert, model, duration, audience, world.CONTROL_STEP / speed if speed else 0.0)
+    duration = source.duration(case.setting) / world_model.CONTROL_STEP
+    watched = _ObservedAgent(
+        agent, case.expert, model, duration, audience, world_model.CONTROL_STEP / speed if speed else 0.0
+    )
     ((_, episode),) = rollout(watched, source, [case], slots=1, threads=1)
     audience.close(episode.actions, watched.insight, episode.success)
     return episode
 
 
-def performer(name: str, reaches: str, seed: int = 0) -> tuple[str, Agent]:
-    """The agent that a name stands for: a row of the leaderboard whose weights ship, or its beginning; or a method.
-
-    Raises MissingWeights, UnknownMethod, BadSettings, AgentError.
-    """
-    ships = {file.parts[-3]: file for file in weights.everything(reaches) if file.stem == f"seed{seed}"}
-    if label := next((label for label in ships if label == name or label.startswith(f"{name}-")), None):
-        return label, weights.own(ships[label])
-    method = methods.create(name, reaches=reaches)
-    if isinstance(method, Learner | Heir):
-        raise weights.MissingWeights(
-            f"no weights of {name!r} ship for {reaches} reaches and seed {seed}; there are {', '.join(ships) or 'none'}"
-        )
-    with blaming(f"agent({seed}) of method {name!r}"):
-        return methods.label(method), method.agent(seed)
-
-
-class _Watched:
+class _ObservedAgent:
     """An agent of one episode, whose every step is shown."""
 
     def __init__(
-        self, agent: Agent, expert: Expert, model: SuccessModel, duration: float, audience: Audience, pace: float
+        self, agent: Agent, expert: Expert, model: SuccessModel, duration: float, audience: Observer, pace: float
     ) -> None:
         self._agent, self._model, self._duration, self._audience, self._pace = agent, model, duration, audience, pace
         self._expert, self._own = ExpertAgent(), expert
@@ -73,10 +56,10 @@ class _Watched:
         self._due = time.perf_counter()
 
     @property
-    def insight(self) -> Insight:
+    def insight(self) -> StepPredictions:
         """The thoughts so far."""
         curves, chances, experts = (np.concatenate(each) for each in (self._curves, self._chances, self._experts))
-        return Insight(GRID, curves, chances, experts, self._duration)
+        return StepPredictions(GRID, curves, chances, experts, self._duration)
 
     def assign(self, episodes: np.ndarray, experts: Sequence[Expert]) -> None:
         """Tells the agent its expert where it asks for one."""

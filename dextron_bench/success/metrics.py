@@ -11,7 +11,7 @@ BINS = 10  # Of the calibration curve, equally wide.
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class Metrics:
     """Scores of predictions of N outcomes; those of the base rate, the mean outcome itself, stand beside them.
 
     `auc` is the chance that a success was given a higher one than a failure, NaN where there is one kind alone.
@@ -27,12 +27,12 @@ class Judgement:
     auc: float
 
 
-def judge(chances: np.ndarray, outcomes: np.ndarray) -> Judgement:
+def evaluate(chances: np.ndarray, outcomes: np.ndarray) -> Metrics:
     """The judgement of chances (N,) in [0, 1] against outcomes (N,), 1 for success."""
     base = float(outcomes.mean())
     means, shares, counts = calibration(chances, outcomes)
     apart = np.abs(means - shares)[counts > 0]
-    return Judgement(
+    return Metrics(
         rows=len(outcomes),
         base_rate=base,
         accuracy=float(((chances > 0.5) == (outcomes == 1)).mean()),

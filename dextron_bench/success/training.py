@@ -58,7 +58,7 @@ def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note:
     epoch. The same call ends with the same bytes, however often it was stopped, and if it had fewer epochs before.
     Raises FolderMismatch, EmptyDataset, BadDataset, BadTensors.
     """
-    lesson = _Lesson(folder, settings)
+    lesson = _TrainingRun(folder, settings)
     file = folder / STATE
     if file.exists():
         lesson.resume(file)
@@ -86,7 +86,7 @@ def network(rng: np.random.Generator) -> nn.Sequential:
     return made
 
 
-class _Lesson:
+class _TrainingRun:
     """A training under way."""
 
     def __init__(self, folder: Path, settings: Fit) -> None:

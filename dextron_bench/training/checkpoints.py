@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.evaluation.rollout import AgentError, blaming
+from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Trainer
 from dextron_bench.storage import atomic, tensors
 from dextron_bench.storage.atomic import DamagedFile
@@ -109,7 +109,7 @@ class Checkpoints:
         if done:
             try:
                 state = tensors.read(self.folder / CHECKPOINT)
-                with blaming("restore() of the trainer"):
+                with as_agent_error("restore() of the trainer"):
                     trainer.restore(state, (tensors.read(self._journal(epoch)) for epoch in self._journaled()))
             except (tensors.BadTensors, AgentError) as error:
                 cause = error if isinstance(error, tensors.BadTensors) else error.__cause__

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dextron_bench.methods import weights
+from dextron_bench.methods import registry, weights
 from dextron_bench.methods.learners import Learner, Track
 from dextron_bench.reaches import sources
-from dextron_bench.runs import run_files as records
-from dextron_bench.splits import loading as splits
+from dextron_bench.runs import run_files
+from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import atomic, tensors
-from dextron_bench.training import loop as training
+from dextron_bench.training import loop, timing
 from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.training.learning_curve import Curve
 
@@ -29,7 +29,7 @@ def place(runs: Path, learner: Learner, reaches: str, seed: int) -> Path:
 
 
 @dataclass(frozen=True)
-class Course:
+class TrainingJob:
     """The training of a learner on a source of reaches."""
 
     learner: Learner
@@ -45,37 +45,37 @@ class Course:
         rest = tuple(seed for seed in missing if not any(seed in group for group in over))
         return [*over, rest] if rest else over
 
-    def teach(self, seeds: Sequence[int], report: training.Report | None = None) -> None:
+    def run(self, seeds: Sequence[int], report: loop.Report | None = None) -> None:
         """Trains seeds that are not trained yet, and puts best weights and curve into the folders of their runs.
 
         Raises Diverged, AgentError, Busy, NoDevice, FolderMismatch, DamagedFile, UnknownSplit, MissingData.
         """
         for seed in seeds:
-            records.check(self._run(seed), records.config(self.learner, self.reaches, seed))
+            run_files.check(self._run(seed), registry.config(self.learner, self.reaches, seed))
         for group in self.groups(seeds):
-            track, val = self.track(), splits.load(self.reaches, "val")
-            folder = training.folder_of(self._base, group)
+            track, val = self.track(), load_split(self.reaches, "val")
+            folder = loop.folder_of(self._base, group)
             for seed in group:
-                records.claim(self._run(seed), records.config(self.learner, self.reaches, seed))
-            done = training.train(self.learner, track, group, folder, val, report or training.quiet)
+                run_files.claim(self._run(seed), registry.config(self.learner, self.reaches, seed))
+            done = loop.train(self.learner, track, group, folder, val, report or loop.quiet)
             curve = Curve(self.learner, done, track.source, val, self.threads)
             for seed in group:
-                self._graduate(done, curve, seed)
+                self._publish_best(done, curve, seed)
 
     def track(self) -> Track:
         """What there is to train with; raises NoDevice, UnknownSplit, MissingData."""
-        cases = splits.load(self.reaches, "train").cases
+        cases = load_split(self.reaches, "train").cases
         source = sources.open_source(self.reaches)
         return Track(source, cases, self.runs / "cache", self.threads, _device(self.device))
 
     def folder(self, group: Sequence[int]) -> Path:
         """Where a group trains."""
-        return training.folder_of(self._base, group)
+        return loop.folder_of(self._base, group)
 
     def seconds(self, seed: int) -> float | None:
         """How long the training of a seed's group took; None where its folder is not there."""
         found = [each for each in self._over() if seed in each]
-        return training.seconds(self.folder(found[0])) if found else None
+        return timing.seconds(self.folder(found[0])) if found else None
 
     @property
     def _base(self) -> Path:
@@ -87,13 +87,13 @@ class Course:
     def _over(self) -> list[tuple[int, ...]]:
         """The groups whose epochs are all done."""
         found = []
-        for folder, group in training.groups(self._base).items():
+        for folder, group in loop.groups(self._base).items():
             progress = Checkpoints(folder, group).progress()
             if progress and progress.over:
                 found.append(group)
         return found
 
-    def _graduate(self, done: Checkpoints, curve: Curve, seed: int) -> None:
+    def _publish_best(self, done: Checkpoints, curve: Curve, seed: int) -> None:
         """Puts a seed's learning curve and best weights into the folder of its run, the weights last."""
         best, last = curve.best(seed), done.epochs()[-1]
         snapshot = done.snapshot(best, seed)
@@ -117,7 +117,7 @@ class UnderWay:
 def under_way(runs: Path) -> list[UnderWay]:
     """The trainings below a folder of runs that are not over; raises DamagedFile."""
     found = []
-    for folder, group in training.groups(runs, "*/*/").items():
+    for folder, group in loop.groups(runs, "*/*/").items():
         progress = Checkpoints(folder, group).progress()
         if not progress or not progress.over:
             left = f"{progress.epochs - progress.epoch} of {progress.epochs} epochs" if progress else "all epochs"

@@ -8,7 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.evaluation.rollout import blaming, rollout
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.methods.agents import as_agent_error
 from dextron_bench.methods.learners import Learner
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
@@ -65,7 +66,7 @@ class Curve:
             weights = tensors.read(snapshot)
         except (tensors.BadTensors, FileNotFoundError) as error:
             raise DamagedFile(snapshot, error) from error
-        with blaming(f"policy() of method {self._learner.name!r}"):
+        with as_agent_error(f"policy() of method {self._learner.name!r}"):
             agent = self._learner.policy(weights)
         cases = self._val.cases[:rows]
         scores = {index: each.score for index, each in rollout(agent, self._source, cases, threads=self._threads)}

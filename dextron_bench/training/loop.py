@@ -12,23 +12,20 @@ import re
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any
 
-from dextron_bench.evaluation.rollout import AgentError, blaming
-from dextron_bench.methods import loading as entrants
-from dextron_bench.methods import registry as methods
+from dextron_bench.methods import loading, registry
+from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, Track, Trainer
-from dextron_bench.runs import run_files as records
+from dextron_bench.runs import run_files
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import hashing
 from dextron_bench.training.checkpoints import Checkpoints, Progress
 from dextron_bench.training.learning_curve import FINALISTS, Curve
+from dextron_bench.training.timing import TIMING
 from dextron_bench.world import model
 
-TIMING = "timing.jsonl"
 NAME = re.compile(r"training-(\d+(?:\+\d+)*)", re.ASCII)  # Of the folders in which seeds train.
-RECENT = 50  # Epochs whose time tells that of the next.
 
 Report = Callable[[int, int, str], None]  # Told (epochs done, epochs in all, how it goes).
 
@@ -62,10 +59,10 @@ def train(
     done = Checkpoints(folder, seeds)
     curve = Curve(learner, done, track.source, val, track.threads)
     with done.locked():
-        records.claim(folder, config(learner, track, seeds))
+        run_files.claim(folder, config(learner, track, seeds))
         found = done.progress()
         if not found or not found.over:
-            _Lesson(learner, track, done, curve, report).finish()
+            _TrainingRun(learner, track, done, curve, report).finish()
         done.finish()
         curve.extend()
         for seed in seeds:
@@ -78,37 +75,27 @@ def config(learner: Learner, track: Track, seeds: Sequence[int]) -> dict[str, An
     """What a training depends on; another is not its continuation."""
     return {
         "method": learner.name,
-        "code": entrants.origin(type(learner)),
-        "settings": methods.settings(learner),
+        "code": loading.origin(type(learner)),
+        "settings": registry.settings(learner),
         "seeds": list(seeds),
         "cases": hashing.digest(repr(list(track.cases)).encode()),
         "physics": model.mjcf_hash(),
     }
 
 
-def seconds_left(folder: Path, epochs: int, period: int) -> float | None:
-    """About how long so many more epochs take [s], from those before; None where there are none."""
-    rows = _timings(folder / TIMING)
-    trained = [row["seconds"] for row in rows if row["what"] == "epoch"][-RECENT:]
-    scored = [row["seconds"] for row in rows if row["what"] == "evaluation"][-RECENT:]
-    if not trained:
-        return None
-    return epochs * median(trained) + math.ceil(epochs / period) * (median(scored) if scored else 0.0)
-
-
 def measure(learner: Learner, track: Track, seeds: Sequence[int]) -> float:
-    """How long an epoch takes [s], from the last of the learner's rehearsal; writes no files of a run."""
-    rehearsal = learner.rehearsal
-    trainer, took = _begin(rehearsal, track, seeds), 0.0
-    while trainer.epoch < rehearsal.epochs:
+    """How long an epoch takes [s], from the last of the learner's timing_run; writes no files of a run."""
+    timing_run = learner.timing_run
+    trainer, took = _begin(timing_run, track, seeds), 0.0
+    while trainer.epoch < timing_run.epochs:
         began = time.perf_counter()
-        with blaming(f"epoch {trainer.epoch + 1} of method {rehearsal.label!r}"):
+        with as_agent_error(f"epoch {trainer.epoch + 1} of method {timing_run.label!r}"):
             trainer.advance()
         took = time.perf_counter() - began
     return took
 
 
-class _Lesson:
+class _TrainingRun:
     """What is left of a training."""
 
     def __init__(self, learner: Learner, track: Track, done: Checkpoints, curve: Curve, report: Report) -> None:
@@ -136,7 +123,7 @@ class _Lesson:
     def _epoch(self, trainer: Trainer) -> list[dict[str, Any]]:
         """One epoch's metrics, a row for each seed."""
         number, began = trainer.epoch + 1, time.perf_counter()
-        with blaming(f"epoch {number} of method {self._learner.label!r}"):
+        with as_agent_error(f"epoch {number} of method {self._learner.label!r}"):
             noted = trainer.advance()
         if trainer.epoch != number or len(noted) != len(self._done.seeds):
             raise AgentError(
@@ -172,7 +159,7 @@ class _Lesson:
         return {
             "method": learner.name,
             "label": learner.label,
-            "settings": methods.settings(learner),
+            "settings": registry.settings(learner),
             "physics": model.mjcf_hash(),
         }
 
@@ -188,22 +175,5 @@ def _begin(learner: Learner, track: Track, seeds: Sequence[int]) -> Trainer:
             f"method {learner.label!r} needs at least one epoch and a period of at least one; "
             f"it has {learner.epochs} and {learner.period}"
         )
-    with blaming(f"trainer() of method {learner.label!r}"):
+    with as_agent_error(f"trainer() of method {learner.label!r}"):
         return learner.trainer(track, seeds)
-
-
-def seconds(folder: Path) -> float | None:
-    """How long a training took so far, epochs and evaluations of its learning curve; None where it is not known."""
-    rows = _timings(folder / TIMING)
-    return round(sum(row["seconds"] for row in rows), 1) if rows else None
-
-
-def _timings(file: Path) -> list[dict[str, Any]]:
-    """The rows of a file of timings; lines that were cut off are left out."""
-    rows = []
-    for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
-        try:
-            rows.append(json.loads(line))
-        except ValueError:
-            continue
-    return rows

@@ -14,7 +14,7 @@ class ActionError(ValueError):
     """An action that the world does not take; the message says what it was and what it must be."""
 
 
-def checked(actions: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def validated_action(actions: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """The actions as 64-bit floats of that shape; raises ActionError.
 
     Refused are other shapes, NaN, and anything beyond [-1, 1] by however little: nothing is clipped, so
@@ -32,7 +32,7 @@ def checked(actions: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return values
 
 
-class Settings:
+class SettingQueue:
     """Deals one setting an episode: those of a list, over and over, or fresh draws from the source."""
 
     def __init__(self, reaches: str | Source, settings: Sequence[Setting] | None = None) -> None:
@@ -47,7 +47,7 @@ class Settings:
         """Goes back to the first setting of the list."""
         self._dealt = 0
 
-    def deal(self, rng: np.random.Generator) -> Setting:
+    def next(self, rng: np.random.Generator) -> Setting:
         """The next episode's setting; `rng` is read only where there is no list."""
         if self._listed is None:
             return self.source.sample(rng)

@@ -20,7 +20,7 @@ from gymnasium.vector.utils import batch_space
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine
-from dextron_bench.world.environment import Settings, checked
+from dextron_bench.world.environment import SettingQueue, validated_action
 
 FRAME = (480, 360)  # [px] width and height of rendered frames.
 LARGEST = 1e10  # MuJoCo calls a simulation with numbers beyond this unstable.
@@ -39,9 +39,9 @@ def action_space() -> Box:
 
 def pictures(states: np.ndarray) -> np.ndarray:
     """Pictures (n, H, W, 3), 8 bit, of states (n, 48)."""
-    from dextron_bench.world.rendering import renderer as appearance  # Loads OpenGL, which most runs never need.
+    from dextron_bench.world.rendering import renderer  # Loads OpenGL, which most runs never need.
 
-    return appearance.frames(states, *FRAME)
+    return renderer.frames(states, *FRAME)
 
 
 class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -61,7 +61,7 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         self.observation_space, self.action_space = observation_space(), action_space()
         self.render_mode = render_mode
-        self._settings = Settings(reaches, settings)
+        self._settings = SettingQueue(reaches, settings)
         self._engine, self._slot = Engine(1, threads=1), np.array([0])
         self._live = False
 
@@ -73,7 +73,7 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if seed is not None:
             self._settings.rewind()
         chosen = (options or {}).get("setting")
-        self._setting = chosen or self._settings.deal(self.np_random)
+        self._setting = chosen or self._settings.next(self.np_random)
         states = self._engine.begin(self._slot, [self._settings.source.path(self._setting)])
         self._live, self._return = True, 0.0
         return states[0], self._info()
@@ -82,7 +82,7 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """One control step; raises ActionError, and ResetNeeded outside an episode."""
         if not self._live:
             raise ResetNeeded("no episode is under way; call reset() first")
-        step = self._engine.step(self._slot, checked(action, (1,))[None])
+        step = self._engine.step(self._slot, validated_action(action, (1,))[None])
         self._live, reward = not step.ended[0], float(step.rewards[0])
         self._return += reward
         return step.states[0], reward, bool(step.terminated[0]), bool(step.truncated[0]), self._info()
@@ -120,7 +120,7 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self.single_observation_space, self.single_action_space = observation_space(), action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._settings, self._engine = Settings(reaches, settings), Engine(num_envs, threads)
+        self._settings, self._engine = SettingQueue(reaches, settings), Engine(num_envs, threads)
         self._rngs = [np_random()[0] for _ in range(num_envs)]
         self._played = np.empty(num_envs, object)
         self._states, self._returns = np.zeros((num_envs, model.STATE)), np.zeros(num_envs)
@@ -143,7 +143,7 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """One control step of every slot; raises ActionError, and ResetNeeded before the first reset."""
         if self._ended is None:
             raise ResetNeeded("no episodes are under way; call reset() first")
-        actions = checked(actions, (self.num_envs, 1))
+        actions = validated_action(actions, (self.num_envs, 1))
         live, over = np.flatnonzero(~self._ended), np.flatnonzero(self._ended)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), bool)
@@ -163,7 +163,7 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
     def _begin(self, slots: np.ndarray) -> None:
         for slot in slots:
-            self._played[slot] = self._settings.deal(self._rngs[slot])
+            self._played[slot] = self._settings.next(self._rngs[slot])
         self._states[slots] = self._engine.begin(slots, [self._settings.source.path(s) for s in self._played[slots]])
         self._returns[slots] = 0.0
 

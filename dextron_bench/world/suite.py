@@ -15,7 +15,7 @@ from dm_env import specs
 from dextron_bench.reaches.reach import PALM_AHEAD, Path
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import model, task
-from dextron_bench.world.environment import Settings, checked
+from dextron_bench.world.environment import SettingQueue, validated_action
 
 
 def load(
@@ -27,7 +27,7 @@ def load(
 
     Takes the source or its name. Raises UnknownSource, MissingData, ActionError.
     """
-    grasp = Grasp(Settings(reaches, settings), np.random.default_rng(seed))
+    grasp = Grasp(SettingQueue(reaches, settings), np.random.default_rng(seed))
     return control.Environment(Physics.load(), grasp, n_sub_steps=model.substeps(), legacy_step=False)
 
 
@@ -60,14 +60,14 @@ class Grasp(control.Task):
 
     setting: Setting
 
-    def __init__(self, settings: Settings, rng: np.random.Generator) -> None:
+    def __init__(self, settings: SettingQueue, rng: np.random.Generator) -> None:
         self._settings, self._rng = settings, rng
         self._progress = task.Progress.empty(1)
         self._outcome = (0.0, False, False)
 
     def initialize_episode(self, physics: Physics) -> None:
         """Deals a setting; half closes the hand and puts it at the start of the reach."""
-        self.setting = self._settings.deal(self._rng)
+        self.setting = self._settings.next(self._rng)
         self._path = self._settings.source.path(self.setting)
         physics.carry(self._path, 0)
         qpos = model.half_closed().copy()
@@ -78,7 +78,7 @@ class Grasp(control.Task):
 
     def before_step(self, action: np.ndarray, physics: Physics) -> None:
         """Commands the fingers and moves the hand on; raises ActionError."""
-        physics.set_control(task.commands(checked(action, (1,))[None])[0])
+        physics.set_control(task.commands(validated_action(action, (1,))[None])[0])
         physics.carry(self._path, int(self._progress.step[0]) + 1)
 
     def after_step(self, physics: Physics) -> None:

@@ -12,8 +12,8 @@ from baselines.exp import Exp
 from baselines.floors import Nothing, Random
 from baselines.omega import OmegaAgent
 from baselines.reflex import BadDistance, Reflex
-from dextron_bench.evaluation.rollout import Agent, Privileged
 from dextron_bench.experts.policies import Expert
+from dextron_bench.methods.agents import Agent, Privileged
 from dextron_bench.world import model, task
 from tests.helpers import fixed_success_model
 

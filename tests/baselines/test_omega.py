@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from baselines.omega import BadRule, NoModel, Omega, OmegaAgent, choose
-from dextron_bench.cli import main as cli
-from dextron_bench.methods import registry as methods
+from dextron_bench.cli import main
+from dextron_bench.methods import registry
 from dextron_bench.storage import hashing
 from dextron_bench.success.network import GRID, SuccessModel
 from tests.helpers import fixed_success_model, tiny_benchmark
@@ -114,9 +114,9 @@ def test_it_acts_the_same_at_any_batch_size():
 
 def test_it_says_which_model_it_acts_with_and_refuses_another(tmp_path: Path):
     file = fixed_success_model.write(tmp_path / "model.safetensors", 0.4)
-    made = Omega(model=str(file)).made_for("real")
+    made = Omega(model=str(file)).for_source("real")
     assert made == Omega(model=str(file), sha256=hashing.sha256(file))
-    again = methods.create("omega", methods.settings(made))
+    again = registry.create("omega", registry.settings(made))
     assert again == made
     np.testing.assert_allclose(made.agent(0).act(states(0.05)), 0.4)
     fixed_success_model.write(file, -0.4)
@@ -126,11 +126,11 @@ def test_it_says_which_model_it_acts_with_and_refuses_another(tmp_path: Path):
 
 def test_what_it_cannot_act_with_is_told(tmp_path: Path):
     with pytest.raises(NoModel, match=r"ships for minjerk reaches.*--model takes the file"):
-        Omega().made_for("minjerk")
+        Omega().for_source("minjerk")
     with pytest.raises(NoModel, match="No such file"):
-        Omega(model=str(tmp_path / "none.safetensors")).made_for("real")
+        Omega(model=str(tmp_path / "none.safetensors")).for_source("real")
     with pytest.raises(NoModel, match=r"takes the file of a model .* or one of real, synthetic.*'nofile'"):
-        Omega(model="nofile").made_for("real")
+        Omega(model="nofile").for_source("real")
     with pytest.raises(BadRule, match="--tolerance is 2; a difference of chances lies between 0 and 1"):
         Omega(tolerance=2.0)
     with pytest.raises(BadRule, match="--near is -1"):
@@ -139,11 +139,11 @@ def test_what_it_cannot_act_with_is_told(tmp_path: Path):
 
 def test_a_method_is_made_for_the_reaches_of_its_run(tmp_path: Path):
     file = fixed_success_model.write(tmp_path / "model.safetensors", 0.4)
-    made = methods.create("omega", {"model": str(file)}, "real")
-    assert methods.settings(made)["sha256"] == hashing.sha256(file)
-    assert methods.create("exp", {}, "real") == methods.create("exp")
-    with pytest.raises(methods.BadSettings, match="'omega': no success model at hand"):
-        methods.create("omega", {}, "minjerk")
+    made = registry.create("omega", {"model": str(file)}, "real")
+    assert registry.settings(made)["sha256"] == hashing.sha256(file)
+    assert registry.create("exp", {}, "real") == registry.create("exp")
+    with pytest.raises(registry.BadSettings, match="'omega': no success model at hand"):
+        registry.create("omega", {}, "minjerk")
 
 
 @pytest.fixture
@@ -161,10 +161,10 @@ def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], c
     assert "no success model ships for minjerk reaches" in told
     assert not (here / "runs").exists()
     file = fixed_success_model.write(here / "model.safetensors", 0.4)
-    assert cli.main([*words, "--model", "model.safetensors", "--json"]) == 0
+    assert main.main([*words, "--model", "model.safetensors", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)[0]["method"] == "omega"
     config = json.loads((here / "runs/omega/synthetic/seed0/config.json").read_text())
-    assert config["settings"] == methods.settings(Omega(model="model.safetensors", sha256=hashing.sha256(file)))
+    assert config["settings"] == registry.settings(Omega(model="model.safetensors", sha256=hashing.sha256(file)))
     fixed_success_model.write(file, -0.4)
     assert "holds another run: it differs in settings" in complaint(*words, "--model", "model.safetensors")
     assert "has no weights" in complaint("eval", "--method", "omega", "--model", "model.safetensors")

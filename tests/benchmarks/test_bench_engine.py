@@ -10,8 +10,10 @@ import pytest
 from mujoco.batch import Batch
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from dextron_bench.evaluation import episodes, rollout
-from dextron_bench.experts import policies as experts
+from dextron_bench.evaluation import episodes
+from dextron_bench.evaluation import rollout as evaluation_rollout
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.reach import Path
 from dextron_bench.world import model
@@ -57,23 +59,23 @@ class Listening(Engine):
         return step
 
 
-def taped(played: list[experts.Case], source: Prepared) -> Tape:
+def taped(played: list[policies.Case], source: Prepared) -> Tape:
     """What a rollout of experts gives to its batch."""
 
     class ThisTape(Listening):
         tape = Tape()
 
-    original, rollout.Engine = rollout.Engine, ThisTape
+    original, evaluation_rollout.Engine = evaluation_rollout.Engine, ThisTape
     try:
         play(played, source, 0)
     finally:
-        rollout.Engine = original
+        evaluation_rollout.Engine = original
     return ThisTape.tape
 
 
-def play(played: list[experts.Case], source: Prepared, threads: int) -> list[tuple[int, episodes.Episode]]:
+def play(played: list[policies.Case], source: Prepared, threads: int) -> list[tuple[int, episodes.Episode]]:
     """Experts through the one evaluation loop."""
-    return list(rollout.rollout(ExpertAgent(), source, played, slots=SLOTS, threads=threads))
+    return list(rollout(ExpertAgent(), source, played, slots=SLOTS, threads=threads))
 
 
 def replay(tape: Tape, batch: Batch) -> None:

@@ -11,12 +11,13 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from rerun.chunk import RrdReader
 
 from dextron_bench import recording
-from dextron_bench.evaluation import episodes, rollout
+from dextron_bench.evaluation import episode_table, episodes
+from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
-from dextron_bench.runs import run_files as records
+from dextron_bench.runs import run_files
 from dextron_bench.splits.loading import Split
-from dextron_bench.success import predict as insight
 from dextron_bench.success.network import SIZES, SuccessModel
+from dextron_bench.success.predict import predict
 from tests.benchmarks.measure import Row, alone, in_turns, note, scaled
 from tests.benchmarks.workload import Prepared, cases
 
@@ -30,7 +31,7 @@ def model() -> SuccessModel:
     return SuccessModel(layers | {"mean": np.zeros(48), "deviation": np.ones(48)})
 
 
-class Stage:
+class LiveView:
     """Episodes as they are rolled out, and ways to keep them."""
 
     def __init__(self, folder: Path) -> None:
@@ -40,13 +41,13 @@ class Stage:
 
     def play(self) -> None:
         """Rolls them out, on all cores."""
-        self.episodes = dict(rollout.rollout(ExpertAgent(), self.source, self.cases))
+        self.episodes = dict(rollout(ExpertAgent(), self.source, self.cases))
 
     def keep(self) -> None:
         """Writes the table of a run, from which each can be played again."""
         split = Split("test", self.source.name, tuple(self.cases), "")
-        rows = [records.row(split, index, self.episodes[index]) for index in range(len(self.cases))]
-        records.store(self.folder, pd.DataFrame(rows))
+        rows = [episode_table.row(split, index, self.episodes[index]) for index in range(len(self.cases))]
+        run_files.store(self.folder, pd.DataFrame(rows))
 
     def record(self) -> None:
         """Writes recordings."""
@@ -56,7 +57,7 @@ class Stage:
     def explain(self) -> None:
         """Writes recordings that show what the success model thinks."""
         for index, each in self.episodes.items():
-            seen = insight.look(self.model, self.source, self.cases[index], each)
+            seen = predict(self.model, self.source, self.cases[index], each)
             recording.write(self.folder / f"{index}.rrd", each, self.source.path(each.setting), {"row": index}, seen)
 
 
@@ -69,14 +70,14 @@ class Stage:
     ],
 )
 def test_keeping_against_rollout(benchmark: BenchmarkFixture, tmp_path: Path, way: str, what: str):
-    stage = Stage(tmp_path)
+    stage = LiveView(tmp_path)
     seconds, rolled = in_turns(benchmark, getattr(stage, way), stage.play, ROUNDS)
     rates = len(stage.cases) / seconds, len(stage.cases) / rolled
     note(benchmark, Row(what, "episodes/s", rates[0], "episodes rolled out, all cores", rates[1]))
 
 
 def test_reading_scalars_back(benchmark: BenchmarkFixture, tmp_path: Path):
-    stage = Stage(tmp_path)
+    stage = LiveView(tmp_path)
     stage.play()
     stage.record()
     files = [tmp_path / f"{number % len(stage.cases)}.rrd" for number in range(scaled(FILES))]

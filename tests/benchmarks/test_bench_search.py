@@ -11,11 +11,10 @@ import pandas as pd
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from dextron_bench.experts import blocks, montecarlo
-from dextron_bench.experts import branching as opening
+from dextron_bench.experts import blocks, branching, montecarlo
 from dextron_bench.experts.montecarlo import Search
 from dextron_bench.reaches.reach import Path
-from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded import cache
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.world.engine import Engine
@@ -44,8 +43,8 @@ class Clocked:
 def scores(source: Clocked, draws: pd.DataFrame, experts_each: int) -> np.ndarray:
     """Sums of rewards of all draws, `experts_each` to an opening."""
     engine = Engine(montecarlo.SLOTS, THREADS)
-    asked = montecarlo.questions(source, draws, experts_each)  # type: ignore[arg-type]  # It only asks for paths.
-    found = dict(opening.answer(engine, asked))
+    asked = montecarlo.batches(source, draws, experts_each)  # type: ignore[arg-type]  # It only asks for paths.
+    found = dict(branching.play(engine, asked))
     return np.concatenate([found[number].returns for number in range(len(found))])
 
 
@@ -79,6 +78,6 @@ def test_open_recorded_reaches(
     benchmark: BenchmarkFixture, release: File, tmp_path: File, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path))
-    archive.import_release(release)
+    cache.import_release(release)
     seconds = alone(benchmark, lambda: open_source("real"), 5)
     note(benchmark, Row("`open_source('real')` from the cache", "times/s", 1 / seconds))

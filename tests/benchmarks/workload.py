@@ -9,7 +9,7 @@ import numpy as np
 
 from dextron_bench.experts import montecarlo
 from dextron_bench.experts.policies import Case, Expert
-from dextron_bench.reaches import setting
+from dextron_bench.reaches import setting as reaches_setting
 from dextron_bench.reaches.reach import Path
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.reaches.setting import Setting, Source
@@ -29,7 +29,7 @@ def cases(count: int) -> list[Case]:
     """Uniform settings with uniform experts, as a search draws them; always the same."""
     draws = montecarlo.draw(reaches(), montecarlo.Search(reaches().name, experts=1, block=count), 0)
     experts = [Expert(gain, critical) for gain, critical in zip(draws["gain"], draws["critical"], strict=True)]
-    return [Case(s, e, 0.0) for s, e in zip(setting.from_frame(draws), experts, strict=True)]
+    return [Case(s, e, 0.0) for s, e in zip(reaches_setting.from_frame(draws), experts, strict=True)]
 
 
 class Prepared:
@@ -48,7 +48,7 @@ class Prepared:
         """As the source itself."""
         return self._source.sample(rng)
 
-    def stratum(self, reach: str) -> setting.Stratum:
+    def stratum(self, reach: str) -> reaches_setting.Stratum:
         """As the source itself."""
         return self._source.stratum(reach)
 

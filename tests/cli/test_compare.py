@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dextron_bench.cli import main as cli
-from dextron_bench.splits import loading as splits
+from dextron_bench.cli import main
 from dextron_bench.splits import strata
+from dextron_bench.splits.loading import load_split
 
-SPLIT = splits.load("real", "test")
+SPLIT = load_split("real", "test")
 ROWS = len(SPLIT.cases)
 
 
@@ -42,7 +42,7 @@ def compared(here: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., di
     """What a comparison says as JSON."""
 
     def run(*words: str) -> dict[str, Any]:
-        assert cli.main(["compare", *words, "--json"]) == 0
+        assert main.main(["compare", *words, "--json"]) == 0
         return json.loads(capsys.readouterr().out)
 
     return run
@@ -91,17 +91,17 @@ def test_swapping_the_two_swaps_the_sign(compared: Callable[..., dict[str, Any]]
     ],
 )
 def test_the_exit_code_says_worse_only_where_asked(here: Path, a: str, b: str, flag: bool, code: int):
-    assert cli.main(["compare", a, b, *(["--fail-if-worse"] if flag else [])]) == code
+    assert main.main(["compare", a, b, *(["--fail-if-worse"] if flag else [])]) == code
 
 
 def test_worse_within_noise_does_not_fail(here: Path):
     rows = np.arange(ROWS)
     write(here / "runs", "unlucky", np.where(rows < 4, 0.0, 20.0))  # Rows 2 and 3 are lost, and no other.
-    assert cli.main(["compare", "good", "unlucky", "--fail-if-worse"]) == 0
+    assert main.main(["compare", "good", "unlucky", "--fail-if-worse"]) == 0
 
 
 def test_what_is_printed_names_rows_and_numbers(here: Path, capsys: pytest.CaptureFixture[str]):
-    assert cli.main(["compare", "good", "bad"]) == 0
+    assert main.main(["compare", "good", "bad"]) == 0
     printed = capsys.readouterr().out
     assert "-0.72 [-" in printed
     assert "1 of 500 settings are solved by more seeds of B: rows 0\n" in printed
@@ -142,7 +142,7 @@ def test_a_version_that_does_not_ship_is_compared_without_its_groups(
 
 @pytest.mark.parametrize("format", ["png", "svg"])
 def test_a_picture_is_drawn(here: Path, format: str):
-    assert cli.main(["compare", "good", "bad", "--into", f"difference.{format}"]) == 0
+    assert main.main(["compare", "good", "bad", "--into", f"difference.{format}"]) == 0
     content = (here / f"difference.{format}").read_bytes()
     assert len(content) > 10_000
     assert content.startswith(b"\x89PNG") if format == "png" else b"<svg" in content

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.cli import main as cli
-from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.cli import main
+from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.recorded import release
 from tests.conftest import Published
 
@@ -115,10 +115,10 @@ def test_a_cache_that_cannot_be_made_is_one_line(published: Published):
 
 def test_debug_shows_where(monkeypatch: pytest.MonkeyPatch):
     with pytest.raises(FileNotFoundError):
-        cli.main(["data", "import", "--debug", "--from", "/none"])
+        main.main(["data", "import", "--debug", "--from", "/none"])
     monkeypatch.setenv("DEXTRON_DEBUG", "1")
     with pytest.raises(FileNotFoundError):
-        cli.main(["data", "import", "--from", "/none"])
+        main.main(["data", "import", "--from", "/none"])
 
 
 @pytest.mark.parametrize(
@@ -126,22 +126,22 @@ def test_debug_shows_where(monkeypatch: pytest.MonkeyPatch):
 )
 def test_wrong_usage_is_code_2(words: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:
-        cli.main(words)
+        main.main(words)
     assert caught.value.code == 2
     assert capsys.readouterr().out == ""
 
 
 def test_every_verb_has_an_example(capsys: pytest.CaptureFixture[str]):
-    for name, verb in cli.VERBS.items():
+    for name, verb in main.COMMANDS.items():
         for inner in [[part] for part in verb[1]] if isinstance(verb, tuple) else [[]]:
             with pytest.raises(SystemExit) as caught:
-                cli.main([name, *inner, "--help"])
+                main.main([name, *inner, "--help"])
             assert caught.value.code == 0
             assert f"Example: dextron-bench {' '.join([name, *inner])}" in capsys.readouterr().out
 
 
 def test_help_imports_nothing_heavy():
-    script = "import sys; from dextron_bench import cli; cli._union(cli.VERBS); print(*sys.modules)"
+    script = "import sys; from dextron_bench import cli; cli._union(cli.COMMANDS); print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert not {"torch", "mujoco", "scipy", "pandas", "matplotlib", "rerun", "pyarrow"} & set(loaded)
 
@@ -163,7 +163,7 @@ def test_a_reader_that_stops_early_is_no_error(published: Published):
     [
         (KeyboardInterrupt(), 130, "interrupted"),
         (OSError(errno.ENOSPC, "No space left on device", "runs/a"), 2, "No space left on device: runs/a"),
-        (archive.MissingData(), 2, "the recorded reaches have not been imported"),
+        (recorded_cache.MissingData(), 2, "the recorded reaches have not been imported"),
         (ModuleNotFoundError("No module named 'ray'"), 2, "No module named 'ray'"),
         (TypeError("two\nlines"), 70, "unexpected TypeError: two lines"),
     ],
@@ -179,8 +179,8 @@ def test_every_end_has_its_code(
         raise error
 
     monkeypatch.delenv("DEXTRON_DEBUG", raising=False)
-    monkeypatch.setattr(archive, "import_release", fail)
-    assert cli.main(["data", "import", "--from", "x"]) == code
+    monkeypatch.setattr(recorded_cache, "import_release", fail)
+    assert main.main(["data", "import", "--from", "x"]) == code
     assert capsys.readouterr().err.startswith(f"dextron-bench: {line}")
 
 

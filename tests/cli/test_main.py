@@ -14,8 +14,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dextron_bench.cli import main as cli
-from dextron_bench.runs.run_files import read_result
+from dextron_bench.cli import main
+from dextron_bench.runs.result_files import read_result
 from dextron_bench.storage import atomic
 from tests.helpers import tiny_benchmark
 
@@ -57,22 +57,22 @@ def run(method: str, *words: str) -> list[str]:
 
 
 def test_results_are_json_and_nothing_else(here: Path, capsys: pytest.CaptureFixture[str]):
-    assert cli.main([*run("exp", "--json"), "--record", "1"]) == 0
+    assert main.main([*run("exp", "--json"), "--record", "1"]) == 0
     printed = capsys.readouterr()
     (row,) = json.loads(printed.out)
     assert (row["method"], row["reaches"], row["split"], row["episodes"]) == ("exp", "synthetic", "test", 2)
     assert (row["return"], row["success"], row["failed"]) == (20.0, 1.0, 0)
     assert printed.err == ""
-    assert cli.main(["leaderboard", "show", "--json"]) == 0
+    assert main.main(["leaderboard", "show", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == [row]
 
 
 def test_a_run_says_where_its_files_are(here: Path, capsys: pytest.CaptureFixture[str]):
-    assert cli.main(["run", "--method", "nothing", "--split", "open", "--quiet"]) == 0
+    assert main.main(["run", "--method", "nothing", "--split", "open", "--quiet"]) == 0
     printed = capsys.readouterr().out
     assert "runs/nothing/synthetic/seed0" in printed
     assert "random" in printed  # The other floor.
-    assert cli.main(["list"]) == 0
+    assert main.main(["list"]) == 0
     printed = capsys.readouterr().out
     assert "Replays the expert" in printed
     assert "unseen-reach" in printed
@@ -82,7 +82,7 @@ def test_an_agent_that_fails_now_and_then_is_code_3_and_the_rest_is_scored(
     here: Path, capsys: pytest.CaptureFixture[str]
 ):
     for spoil, failure in (("actions[0] = np.nan", "action is nan"), ("actions[0] = 1.001", "is outside [-1, 1]")):
-        assert cli.main(run(mine(here, spoil), "--json", "--runs", failure[:9])) == 3
+        assert main.main(run(mine(here, spoil), "--json", "--runs", failure[:9])) == 3
         (row,) = json.loads(capsys.readouterr().out)
         assert (row["episodes"], row["failed"]) == (2, 1)
         episodes = pd.read_parquet(here / failure[:9] / "mine" / "synthetic" / "seed0" / "episodes.parquet")
@@ -136,7 +136,7 @@ def test_what_is_not_there_is_one_line(here: Path, complaint: Callable[..., str]
 )
 def test_wrong_words_are_code_2(words: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:
-        cli.main(words)
+        main.main(words)
     assert caught.value.code == 2
     printed = capsys.readouterr()
     assert printed.out == ""
@@ -182,7 +182,7 @@ def test_a_damaged_run_is_one_line_that_names_the_file(
     here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str], name: str
 ):
     words = ["run", "--method", "nothing", "--split", "open", "--no-floors", "--quiet"]
-    assert cli.main(words) == 0
+    assert main.main(words) == 0
     file = here / "runs" / "nothing" / "synthetic" / "seed0" / name
     file.write_bytes(file.read_bytes()[:20])
     line = complaint(*(["leaderboard", "show"] if name == "result.json" else words))
@@ -190,7 +190,7 @@ def test_a_damaged_run_is_one_line_that_names_the_file(
     assert "remove it and run again" in line
     file.unlink()
     if name != "config.json":
-        assert cli.main(words) == 0  # As the line said.
+        assert main.main(words) == 0  # As the line said.
 
 
 def test_a_damaged_split_is_one_line(here: Path, complaint: Callable[..., str]):
@@ -201,9 +201,9 @@ def test_a_damaged_split_is_one_line(here: Path, complaint: Callable[..., str]):
 
 
 def test_a_leaderboard_without_results_says_how_to_make_some(here: Path, capsys: pytest.CaptureFixture[str]):
-    assert cli.main(["leaderboard", "show"]) == 0
+    assert main.main(["leaderboard", "show"]) == 0
     assert "dextron-bench run" in capsys.readouterr().out
-    assert cli.main(["leaderboard", "show", "--json"]) == 0
+    assert main.main(["leaderboard", "show", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == []
 
 
@@ -214,7 +214,7 @@ def test_a_search_prints_json(here: Path, monkeypatch: pytest.MonkeyPatch, capsy
         [("a", 0.0, 0.0, 0.0, 1.0, 0.5, 20.0, 90)], columns=[*tiny_benchmark.COLUMNS[1:7], "score", "length"]
     )
     monkeypatch.setattr(montecarlo, "run", lambda *_, **__: draws)
-    assert cli.main(["mc", "--json", "--quiet"]) == 0
+    assert main.main(["mc", "--json", "--quiet"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["kept"], found["solved"]) == (1, 1)
 
@@ -239,7 +239,7 @@ def test_interrupted_a_run_is_code_130_and_goes_on_later(here: Path, capsys: pyt
     assert (process.returncode, err) == (130, "dextron-bench: interrupted\n")
     left = here / "runs" / "mine" / "synthetic" / "seed0"
     assert sorted(os.listdir(left)) == ["config.json", "provenance.json"]
-    assert cli.main(words) == 0
+    assert main.main(words) == 0
     assert len(read_result(left / "result.json")["splits"]["test"]["scores"]) == 2
 
 
@@ -298,6 +298,6 @@ def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
 )
 def test_help_of_a_verb_has_an_example(words: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:
-        cli.main([*words, "--help"])
+        main.main([*words, "--help"])
     assert caught.value.code == 0
     assert f"Example: dextron-bench {words[0]}" in capsys.readouterr().out

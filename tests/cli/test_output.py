@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from dextron_bench.cli import output as printing
+from dextron_bench.cli import output
 
 
 class Terminal:
@@ -32,7 +32,7 @@ def test_a_bar_shows_count_rate_and_time_left(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("NO_COLOR", "1")
-    with printing.progress_bar("rows") as progress:
+    with output.progress_bar("rows") as progress:
         progress(100, 400)  # What an earlier run did says nothing of the rate.
         for done in (110, 120, 130):
             time.sleep(0.1)
@@ -45,11 +45,11 @@ def test_a_bar_shows_count_rate_and_time_left(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_bar_is_silent_off_a_terminal_and_when_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
-    with printing.progress_bar("rows") as progress:
+    with output.progress_bar("rows") as progress:
         progress(1, 2)
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with printing.progress_bar("rows", quiet=True) as progress:
+    with output.progress_bar("rows", quiet=True) as progress:
         progress(1, 2)
     assert terminal.text == ""
     monkeypatch.undo()
@@ -58,4 +58,4 @@ def test_a_bar_is_silent_off_a_terminal_and_when_told(monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize(("speed", "text"), [(None, ""), (0.0123, "0.012/s"), (4.56, "4.6/s"), (1234.5, "1234/s")])
 def test_rates_are_short(speed: float | None, text: str):
-    assert printing._rate(speed) == text
+    assert output._rate(speed) == text

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from rerun.chunk import RrdReader
 
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from tests.helpers import tiny_benchmark
 
 FOLDER = "runs/exp/synthetic/seed0/recordings"
@@ -22,19 +22,19 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A working folder in the tiny world with a run of two recorded episodes."""
     tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["run", "--split", "test", "--no-floors", "--quiet", "--json", "--record", "2"]) == 0
+    assert main.main(["run", "--split", "test", "--no-floors", "--quiet", "--json", "--record", "2"]) == 0
     yield tmp_path
     tiny_benchmark.forget()
 
 
 def test_recordings_are_listed_with_what_they_say(here: Path, capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
-    assert cli.main(["recordings", "list"]) == 0
+    assert main.main(["recordings", "list"]) == 0
     printed = capsys.readouterr()
     assert [title in printed.out for title in ("file", "outcome", "kB", "success", "20.000")] == [True] * 5
     assert [f"{FOLDER}/test-000{row}.rrd" in printed.out for row in (0, 1)] == [True] * 2  # In one piece.
     assert printed.err == ""
-    assert cli.main(["recordings", "list", f"{FOLDER}/test-0001.rrd", "--json", "--check"]) == 0
+    assert main.main(["recordings", "list", f"{FOLDER}/test-0001.rrd", "--json", "--check"]) == 0
     (row,) = json.loads(capsys.readouterr().out)
     steps = int(pd.read_parquet(Path(FOLDER).parent / "episodes.parquet")["length"][1])
     assert row == {
@@ -49,7 +49,7 @@ def test_damaged_recordings_are_a_line_each_and_code_1(here: Path, capsys: pytes
     cut.write_bytes(cut.read_bytes()[:-30])
     text.write_text("reach,return\n")
     capsys.readouterr()
-    assert cli.main(["recordings", "list"]) == 1
+    assert main.main(["recordings", "list"]) == 1
     printed = capsys.readouterr()
     assert printed.err.splitlines() == [
         f"dextron-bench: {cut}: is cut short, or its writing was: it has no footer",
@@ -57,11 +57,11 @@ def test_damaged_recordings_are_a_line_each_and_code_1(here: Path, capsys: pytes
     ]
     assert str(whole) in printed.out
     assert str(cut) not in printed.out
-    assert cli.main(["recordings", "list", "--json"]) == 1
+    assert main.main(["recordings", "list", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert [bool(row["damage"]) for row in found] == [False, True, True]
     assert [row["return"] for row in found] == [20.0, None, None]
-    assert cli.main(["recordings", "list", str(text)]) == 1
+    assert main.main(["recordings", "list", str(text)]) == 1
     assert capsys.readouterr().out == ""
 
 
@@ -73,19 +73,19 @@ def test_a_run_knows_its_files_by_their_hashes(here: Path, capsys: pytest.Captur
     row_ids = chunk.to_record_batch().column("rerun.controls.RowId")
     content[content.index(row_ids[0].as_py())] ^= 1
     file.write_bytes(content)
-    assert cli.main(["recordings", "list"]) == 0
+    assert main.main(["recordings", "list"]) == 0
     capsys.readouterr()
-    assert cli.main(["recordings", "list", "--check"]) == 1
+    assert main.main(["recordings", "list", "--check"]) == 1
     assert f"{file}: is not the file whose SHA-256 was kept" in capsys.readouterr().err
 
 
 def test_a_recording_is_exported_as_a_film_and_a_table(here: Path, capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
     words = ["recordings", "export", f"{FOLDER}/test-0000.rrd", "--quiet", "--into"]
-    assert cli.main([*words, "out/grasp.gif", "--width", "32", "--height", "24", "--speed", "20"]) == 0
+    assert main.main([*words, "out/grasp.gif", "--width", "32", "--height", "24", "--speed", "20"]) == 0
     assert capsys.readouterr() == ("out/grasp.gif\n", "")
     assert Image.open("out/grasp.gif").size == (32, 24)
-    assert cli.main([*words, "grasp.csv"]) == 0
+    assert main.main([*words, "grasp.csv"]) == 0
     assert pd.read_csv("grasp.csv")["reward"].sum() == 20.0
 
 

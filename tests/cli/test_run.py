@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from dextron_bench.cli.method_flags import in_a_line
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
@@ -46,7 +46,7 @@ def evaluate(*words: str) -> list[str]:
 
 def rows(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
     capsys.readouterr()
-    assert cli.main([*words, "--json"]) == 0
+    assert main.main([*words, "--json"]) == 0
     return json.loads(capsys.readouterr().out)
 
 
@@ -60,12 +60,12 @@ def test_a_run_trains_all_seeds_together_and_says_so(here: Path, capsys: pytest.
     assert (told["seeds"], told["epochs"], told["best_epoch"], told["frames"]) == ([0, 1], 2, 2, 40)
     assert told["sha256"] == hashing.sha256(base / "seed1" / "weights.safetensors")
     assert [point["epoch"] for point in json.loads((base / "seed1" / "curve.json").read_text())["points"]] == [2]
-    assert cli.main(["list"]) == 0
+    assert main.main(["list"]) == 0
     assert "toy-0.3" in capsys.readouterr().out
 
 
 def test_seeds_that_are_trained_are_not_trained_again(here: Path, capsys: pytest.CaptureFixture[str]):
-    assert cli.main(run(TOY, "--seed", "1")) == 0
+    assert main.main(run(TOY, "--seed", "1")) == 0
     before = tiny_training.contents(here / "runs" / "toy-0.1" / "synthetic" / "seed1")
     (row,) = rows(capsys, *run(TOY, "--seed", "0", "1", "2"))
     assert row["seeds"] == 3
@@ -77,17 +77,17 @@ def test_seeds_that_are_trained_are_not_trained_again(here: Path, capsys: pytest
 def test_an_heir_acts_with_what_its_teacher_learned_at_home(here: Path, capsys: pytest.CaptureFixture[str]):
     (row,) = rows(capsys, *run(HEIR))
     assert (row["method"], row["reaches"]) == ("toy-heir", "synthetic")
-    teacher = here / "runs" / "homely-0.1" / "minjerk" / "seed0"
+    source_policy = here / "runs" / "homely-0.1" / "minjerk" / "seed0"
     heir = here / "runs" / "toy-heir" / "synthetic" / "seed0"
-    assert (teacher / "weights.safetensors").read_bytes() == (heir / "weights.safetensors").read_bytes()
+    assert (source_policy / "weights.safetensors").read_bytes() == (heir / "weights.safetensors").read_bytes()
     assert json.loads((heir / "result.json").read_text())["training"]["label"] == "homely-0.1"
     found = rows(capsys, *run(HOMELY), "--floors")
     assert {row["method"]: row["reaches"] for row in found} == dict.fromkeys(
         ("homely-0.1", "nothing", "random"), "minjerk"
     )
-    arrays = tensors.read(teacher / "weights.safetensors")
-    tensors.write(teacher / "weights.safetensors", arrays, {"label": "homely-0.1", "seed": 1})
-    assert cli.main(run(HEIR)) == 2
+    arrays = tensors.read(source_policy / "weights.safetensors")
+    tensors.write(source_policy / "weights.safetensors", arrays, {"label": "homely-0.1", "seed": 1})
+    assert main.main(run(HEIR)) == 2
     assert "holds a run with other weights" in capsys.readouterr().err
 
 
@@ -99,20 +99,20 @@ def test_a_dry_run_says_what_is_left_and_writes_nothing(here: Path, capsys: pyte
     assert (play["what"], play["left"]) == ("evaluate", "4 episodes")
     assert 0 < play["seconds"] < 60
     assert not (here / "runs").exists()
-    assert cli.main([*run(TOY, "--breaks", "2", "--every", "1")]) == 2
+    assert main.main([*run(TOY, "--breaks", "2", "--every", "1")]) == 2
     train, _ = rows(capsys, *run(TOY, "--breaks", "2", "--every", "1"), "--dry-run")
     assert train["left"] == "1 of 2 epochs"
-    assert cli.main(["list"]) == 0
+    assert main.main(["list"]) == 0
     assert "1 of 2 epochs" in capsys.readouterr().out
-    assert cli.main(words[:-1]) == 2  # The folder has a run with other settings.
-    assert cli.main([*run(TOY, "--runs", "other")]) == 0
+    assert main.main(words[:-1]) == 2  # The folder has a run with other settings.
+    assert main.main([*run(TOY, "--runs", "other")]) == 0
     assert rows(capsys, *run(TOY, "--runs", "other"), "--dry-run") == []
-    assert cli.main([*run(TOY, "--runs", "other"), "--dry-run"]) == 0
+    assert main.main([*run(TOY, "--runs", "other"), "--dry-run"]) == 0
 
 
 def test_flags_of_a_method_are_in_the_help(here: Path, capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:
-        cli.main(["run", "--method", TOY, "--help"])
+        main.main(["run", "--method", TOY, "--help"])
     assert caught.value.code == 0
     printed = capsys.readouterr().out
     assert "--rate" in printed

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from dextron_bench.storage import tensors
-from dextron_bench.success import generation as collection
-from dextron_bench.success import training as fit
+from dextron_bench.success import generation, training
 from tests.helpers import tiny_benchmark, tiny_training
 
 
@@ -20,8 +19,8 @@ from tests.helpers import tiny_benchmark, tiny_training
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty working folder in the tiny world, with small blocks."""
     tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.setattr(collection.Collection.__init__, "__defaults__", ("synthetic", 0, (), 5))
-    monkeypatch.setattr(fit.Fit.__init__, "__defaults__", (30, 2, 8, 1e-3, 100, 0))
+    monkeypatch.setattr(generation.Collection.__init__, "__defaults__", ("synthetic", 0, (), 5))
+    monkeypatch.setattr(training.Fit.__init__, "__defaults__", (30, 2, 8, 1e-3, 100, 0))
     monkeypatch.setattr("baselines.bc.STEPS", 2)
     monkeypatch.chdir(tmp_path)
     yield tmp_path
@@ -30,27 +29,27 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.CaptureFixture[str]):
     run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
-    assert cli.main(run) == 0
+    assert main.main(run) == 0
     words = ["--policies", "runs/bc-smoke/synthetic/seed0/weights.safetensors", "--rows", "1500", "--quiet"]
     capsys.readouterr()
-    assert cli.main(["success", "data", *words, "--json"]) == 0
+    assert main.main(["success", "data", *words, "--json"]) == 0
     rows = {row["kind"]: row for row in json.loads(capsys.readouterr().out)}
     assert rows.keys() >= {"solved", "policy", "all"}
     assert rows["solved"]["success_rate"] == 1.0
     assert rows["all"]["rows"] == sum(row["rows"] for kind, row in rows.items() if kind != "all") >= 1500
-    assert cli.main(["success", "train", "--epochs", "2", "--quiet"]) == 0
+    assert main.main(["success", "train", "--epochs", "2", "--quiet"]) == 0
     assert "model.safetensors" in capsys.readouterr().out
     assert [
-        point["epoch"] for point in tensors.read_about(here / "runs/success/synthetic/seed0" / fit.MODEL)["curve"]
+        point["epoch"] for point in tensors.read_about(here / "runs/success/synthetic/seed0" / training.MODEL)["curve"]
     ] == [1, 2]
-    assert cli.main(["success", "eval", "--split", "test", *words[:2], "--json"]) == 0
+    assert main.main(["success", "eval", "--split", "test", *words[:2], "--json"]) == 0
     experts, policy = json.loads(capsys.readouterr().out)
     assert (experts["split"], experts["player"], policy["player"]) == ("test", "experts", words[1])
     assert 0.0 < experts["base_rate"] < 1.0  # Those of the rows succeed, those drawn do not.
     assert sum(experts["predictions"]) == experts["rows"]
     assert len(experts["auc_by_time"]) == 11
-    assert cli.main(["success", "eval", "--split", "test"]) == 0
-    assert cli.main(["success", "explain", *words[:2], "--into", "pictures/fig5.png"]) == 0
+    assert main.main(["success", "eval", "--split", "test"]) == 0
+    assert main.main(["success", "explain", *words[:2], "--into", "pictures/fig5.png"]) == 0
     assert "expert" in capsys.readouterr().out
     assert (here / "pictures" / "fig5.png").exists()
 
@@ -71,5 +70,5 @@ def test_wrong_words_point_to_the_help_of_their_own_verb(capsys: pytest.CaptureF
         (["nope"], ""),
     ):
         with pytest.raises(SystemExit):
-            cli.main(words)
+            main.main(words)
         assert capsys.readouterr().err.endswith(f"see `{f'dextron-bench {verb}'.strip()} --help`\n")

@@ -11,7 +11,7 @@ import pytest
 import rerun as rr
 
 from dextron_bench import recording
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from dextron_bench.success import network
 from tests.helpers import fixed_success_model, tiny_benchmark
 
@@ -24,8 +24,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
     words = ["--split", "test", "--no-floors", "--quiet", "--json"]
-    assert cli.main(["run", "--method", "exp", "--record", "1", *words]) == 0
-    assert cli.main(["run", "--method", "nothing", "--record", "0", *words]) == 0
+    assert main.main(["run", "--method", "exp", "--record", "1", *words]) == 0
+    assert main.main(["run", "--method", "nothing", "--record", "0", *words]) == 0
     yield tmp_path
     tiny_benchmark.forget()
 
@@ -44,9 +44,9 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_without_a_wish_what_is_there_is_opened(here: Path, opened: list[str]):
-    assert cli.main(["view"]) == 0
-    assert cli.main(["view", "runs/exp/synthetic/seed0"]) == 0
-    assert cli.main(["view", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]) == 0
+    assert main.main(["view"]) == 0
+    assert main.main(["view", "runs/exp/synthetic/seed0"]) == 0
+    assert main.main(["view", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]) == 0
     assert opened == ["runs/exp/synthetic/seed0/recordings/test-0000.rrd"] * 3
     assert not (here / NOTHING / "recordings").exists()
 
@@ -55,7 +55,7 @@ def test_the_worst_and_the_best_are_opened_together_and_told(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
 ):
     capsys.readouterr()
-    assert cli.main(["view", "--worst", "1", "--best", "1", "--quiet"]) == 0
+    assert main.main(["view", "--worst", "1", "--best", "1", "--quiet"]) == 0
     assert opened == [f"{NOTHING}/recordings/test-0000.rrd", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]
     printed = capsys.readouterr()
     assert [word in printed.out for word in ("nothing", "exp", "solved", "return")] == [True] * 4
@@ -69,25 +69,25 @@ def test_the_worst_and_the_best_are_opened_together_and_told(
 def test_files_are_printed_for_other_programs(here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
     words = ["--failed", "--print", "--method", "nothing", "--split", "test", "--reaches", "synthetic", "--seed", "0"]
-    assert cli.main(["view", ".", *words]) == 0
+    assert main.main(["view", ".", *words]) == 0
     printed = capsys.readouterr()
     assert (opened, printed.err) == ([], "")
     assert printed.out.splitlines() == [f"{NOTHING}/recordings/test-000{row}.rrd" for row in (0, 1)]
-    assert cli.main(["view", "--runs", "runs", "--row", "1", "--print"]) == 0
+    assert main.main(["view", "--runs", "runs", "--row", "1", "--print"]) == 0
     assert [line.split("/")[1] for line in capsys.readouterr().out.splitlines()] == ["exp", "nothing"]
 
 
 def test_what_is_damaged_is_named_and_the_rest_is_opened(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
 ):
-    assert cli.main(["view", "--quiet", "--split", "test"]) == 0
+    assert main.main(["view", "--quiet", "--split", "test"]) == 0
     first, *others = list(opened)
     opened.clear()
     content = bytearray(Path(first).read_bytes())
     content[len(content) // 2] ^= 1
     Path(first).write_bytes(content)
     capsys.readouterr()
-    assert cli.main(["view", "runs"]) == 1
+    assert main.main(["view", "runs"]) == 1
     assert opened == others
     assert capsys.readouterr().err == (
         f"dextron-bench: {first}: is not the file whose SHA-256 was kept; it was damaged or changed after writing\n"
@@ -97,10 +97,10 @@ def test_what_is_damaged_is_named_and_the_rest_is_opened(
 def test_where_more_match_it_says_how_to_have_them(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
-    from dextron_bench.runs import selection as gallery
+    from dextron_bench.runs import selection
 
-    monkeypatch.setattr(gallery, "LIMIT", 1)
-    assert cli.main(["view", "--split", "test"]) == 0
+    monkeypatch.setattr(selection, "LIMIT", 1)
+    assert main.main(["view", "--split", "test"]) == 0
     assert "4 episodes are as asked for, these are the first 1; --worst 4 takes all" in capsys.readouterr().err
     assert len(opened) == 1
 
@@ -124,12 +124,12 @@ def test_what_cannot_be_opened_is_one_line(here: Path, opened: list[str], compla
 
 
 def test_two_runs_are_put_side_by_side_on_a_row_that_only_one_solves(here: Path, opened: list[str]):
-    assert cli.main(["view", "--diff", "runs/exp", NOTHING]) == 0
+    assert main.main(["view", "--diff", "runs/exp", NOTHING]) == 0
     assert opened == ["runs/pairs/exp-0--nothing-0--test-0000.rrd"]
-    assert cli.main(["view", "--diff", "runs/exp", NOTHING, "--row", "1"]) == 0
+    assert main.main(["view", "--diff", "runs/exp", NOTHING, "--row", "1"]) == 0
     assert opened[1] == "runs/pairs/exp-0--nothing-0--test-0001.rrd"
     files = ["runs/exp/synthetic/seed0/recordings/test-0000.rrd", f"{NOTHING}/recordings/test-0000.rrd"]
-    assert cli.main(["view", "--diff", *files]) == 0
+    assert main.main(["view", "--diff", *files]) == 0
     assert len(opened) == 3
 
 
@@ -142,13 +142,13 @@ def test_a_policy_at_work_is_watched(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
 ):
     @contextmanager
-    def theatre() -> Iterator[tuple[Callable[[rr.RecordingStream], None], Callable[[], int]]]:
+    def open_live_viewer() -> Iterator[tuple[Callable[[rr.RecordingStream], None], Callable[[], int]]]:
         yield lambda stream: stream.save(here / "live.rrd"), lambda: 0
 
-    monkeypatch.setattr(recording, "theatre", theatre)
+    monkeypatch.setattr(recording, "open_live_viewer", open_live_viewer)
     monkeypatch.setattr(network, "shipped", lambda reaches: fixed_success_model.model(0.5))
     capsys.readouterr()
-    assert cli.main(["view", "--live", "--method", "nothing", "--row", "1", "--speed", "0"]) == 0
+    assert main.main(["view", "--live", "--method", "nothing", "--row", "1", "--speed", "0"]) == 0
     assert capsys.readouterr().out == "nothing on row 1 of test: 0 of 20\n"
     assert (here / "live.rrd").stat().st_size > 100_000
     assert "takes one --method" in complaint("view", "--live")

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from baselines import schedule
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from tests.helpers import tiny_benchmark, tiny_training
 from tests.helpers.tiny_training import TOY
 
@@ -35,7 +35,7 @@ def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[st
     monkeypatch.setattr("baselines.bc.STEPS", 5)
     monkeypatch.setitem(schedule.SCHEDULES, "smoke", schedule.Schedule(epochs=2, warm_start=60, period=1))
     words = ["run", "--all", "--preset", "smoke", *FAST, "--json"]
-    assert cli.main(words) == 0
+    assert main.main(words) == 0
     found = {row["method"]: row for row in json.loads(capsys.readouterr().out)}
     trained = {"bc-smoke", "rl-smoke", "rlil-0.1-smoke", "rlil-0.3-smoke", "sim-0.1-smoke", "sor-smoke"}
     assert found.keys() == {"exp", "nothing", "random"} | trained
@@ -48,7 +48,7 @@ def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[st
         for name in ("sim-0.1-smoke/minjerk", "sor-smoke/synthetic")
     }
     assert len({file.read_bytes() for file in of.values()}) == 1
-    assert cli.main([*words, "--dry-run"]) == 0
+    assert main.main([*words, "--dry-run"]) == 0
     assert json.loads(capsys.readouterr().out) == []  # All is done.
 
 

@@ -12,8 +12,8 @@ import pytest
 import torch
 
 from baselines.floors import Nothing
-from dextron_bench.cli import main as cli
-from dextron_bench.evaluation import minari_export as export
+from dextron_bench.cli import main
+from dextron_bench.evaluation import minari_export
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.reaches.setting import Setting
@@ -27,13 +27,18 @@ minari = pytest.importorskip("minari", reason="Minari is not installed: pip inst
 
 CASES = tuple(Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS[:3])
 SPLIT = Split("train", "synthetic", CASES, "5a5a")
-EXPERT, STILL = export.Player("expert", ExpertAgent()), export.Player("nothing", Nothing().agent(0), {"sha256": "0f"})
+EXPERT, STILL = (
+    minari_export.Player("expert", ExpertAgent()),
+    minari_export.Player("nothing", Nothing().agent(0), {"sha256": "0f"}),
+)
 NAME = "dextron/brief-v0"
 
 
-def write(into: Path, players: list[export.Player], split: Split = SPLIT, rows: int = 3, **options):
+def write(into: Path, players: list[minari_export.Player], split: Split = SPLIT, rows: int = 3, **options):
     """Exports made-up reaches, and loads what Minari finds."""
-    return minari.MinariDataset(export.Export(NAME, split, rows, players).write(SOURCE, into, **options) / "data")
+    return minari.MinariDataset(
+        minari_export.Export(NAME, split, rows, players).write(SOURCE, into, **options) / "data"
+    )
 
 
 def test_minari_loads_what_was_played_to_the_last_bit(tmp_path: Path):
@@ -54,7 +59,7 @@ def test_minari_loads_what_was_played_to_the_last_bit(tmp_path: Path):
         assert not stored.truncations[:-1].any()
 
 
-def play(player: export.Player, rows: int):
+def play(player: minari_export.Player, rows: int):
     return rollout(player.agent, SOURCE, CASES[:rows], threads=1)
 
 
@@ -76,7 +81,7 @@ def test_the_data_set_says_where_it_is_from(tmp_path: Path):
     assert about["dextron_bench"]["split"] == {"reaches": "synthetic", "name": "train", "digest": "5a5a", "rows": 3}
     assert about["dextron_bench"]["players"] == [{"name": "expert"}, {"name": "nothing", "sha256": "0f"}]
     assert about["dextron_bench"]["provenance"]["versions"]["mujoco"]
-    assert about["author"] == {export.CONTRIBUTORS}
+    assert about["author"] == {minari_export.CONTRIBUTORS}
     assert about["algorithm_name"] == "expert, nothing"
     assert about["dataset_size"] > 0.1  # Megabytes.
     assert loaded.id == NAME
@@ -112,19 +117,19 @@ def test_what_cannot_be_exported_is_told_and_leaves_nothing(tmp_path: Path, monk
         def act(self, states: np.ndarray) -> np.ndarray:
             return np.full((len(states), 1), np.nan)
 
-    with pytest.raises(export.BadExport, match=r"mad failed in row 0 of 'train': action is nan"):
-        write(tmp_path, [export.Player("mad", Mad())])
+    with pytest.raises(minari_export.BadExport, match=r"mad failed in row 0 of 'train': action is nan"):
+        write(tmp_path, [minari_export.Player("mad", Mad())])
     assert not list(tmp_path.rglob("*brief*"))
     write(tmp_path, [STILL], rows=1)
-    with pytest.raises(export.BadExport, match="is there already; remove it, or choose another --name"):
+    with pytest.raises(minari_export.BadExport, match="is there already; remove it, or choose another --name"):
         write(tmp_path, [STILL], rows=1)
     for name in ("../up-v0", "brief", "a b-v0", "/brief-v0"):
-        with pytest.raises(export.BadExport, match="names no data set"):
-            export.Export(name, SPLIT, 1, [STILL])
-    with pytest.raises(export.BadExport, match="at least one row"):
-        export.Export(NAME, SPLIT, 0, [STILL])
+        with pytest.raises(minari_export.BadExport, match="names no data set"):
+            minari_export.Export(name, SPLIT, 1, [STILL])
+    with pytest.raises(minari_export.BadExport, match="at least one row"):
+        minari_export.Export(NAME, SPLIT, 0, [STILL])
     monkeypatch.setitem(sys.modules, "minari.dataset.minari_storage", None)
-    with pytest.raises(export.MissingMinari, match="pip install"):
+    with pytest.raises(minari_export.MissingMinari, match="pip install"):
         write(tmp_path / "b", [STILL])
 
 
@@ -176,16 +181,16 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
     words = ["data", "export", "--into", "sets", "--split", "test"]
-    assert cli.main([*words, "--json"]) == 0
+    assert main.main([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["name"], told["episodes"], told["solved"]) == ("dextron/synthetic-test-experts-v0", 2, 2)
     assert told["folder"] == "sets/dextron/synthetic-test-experts-v0"
     assert "is there already" in complaint(*words)
     assert "no data set" in complaint(*words, "--name", "mine")
     run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
-    assert cli.main(run) == 0
+    assert main.main(run) == 0
     weights = "runs/bc-smoke/synthetic/seed0/weights.safetensors"
-    assert cli.main([*words, "--weights", weights, "--rows", "1", "--author", "A. Person"]) == 0
+    assert main.main([*words, "--weights", weights, "--rows", "1", "--author", "A. Person"]) == 0
     about = minari.MinariDataset("sets/dextron/synthetic-test-policies-v0/data").storage.metadata
     assert about["author"] == {"A. Person"}
     assert about["dextron_bench"]["players"][0]["sha256"] == hashing.sha256(here / weights)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.rollout import AgentError, fault, rollout
+from dextron_bench.evaluation.rollout import fault, rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.methods.agents import AgentError
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.reaches.setting import Setting
 

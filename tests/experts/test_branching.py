@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from dextron_bench.evaluation import rollout
-from dextron_bench.experts import branching as opening
-from dextron_bench.experts import policies as experts
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts import branching, policies
 from dextron_bench.experts.policies import Expert, ExpertAgent
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.world.engine import Engine
@@ -14,20 +13,20 @@ SOURCE = MinjerkSource()
 CRITICALS = np.array([0.12, 0.95, 0.30, 0.12, 0.02])
 
 
-def ask(numbers: range, criticals: np.ndarray, slots: int, threads: int = 1) -> list[opening.Answer]:
+def ask(numbers: range, criticals: np.ndarray, slots: int, threads: int = 1) -> list[branching.Outcomes]:
     """Answers for that many minjerk reaches, in order."""
     settings = [SOURCE.sample(np.random.default_rng(number)) for number in numbers]
-    questions = [opening.Question(SOURCE.path(each), 2.0, criticals) for each in settings]
-    answers = dict(opening.answer(Engine(slots, threads), questions))
-    return [answers[number] for number in sorted(answers)]
+    batches = [branching.ExpertBatch(SOURCE.path(each), 2.0, criticals) for each in settings]
+    outcomes = dict(branching.play(Engine(slots, threads), batches))
+    return [outcomes[number] for number in sorted(outcomes)]
 
 
 @pytest.fixture(scope="module")
 def alone() -> tuple[np.ndarray, np.ndarray]:
     """Returns and lengths (2, 5) of the same experts played one by one."""
     settings = [SOURCE.sample(np.random.default_rng(number)) for number in range(2)]
-    cases = [experts.Case(each, Expert(2.0, float(critical)), 0.0) for each in settings for critical in CRITICALS]
-    played = dict(rollout.rollout(ExpertAgent(), SOURCE, cases, threads=1))
+    cases = [policies.Case(each, Expert(2.0, float(critical)), 0.0) for each in settings for critical in CRITICALS]
+    played = dict(rollout(ExpertAgent(), SOURCE, cases, threads=1))
     scores = np.array([played[i].score for i in range(len(cases))])
     lengths = np.array([len(played[i].actions) for i in range(len(cases))])
     return scores.reshape(2, -1), lengths.reshape(2, -1)
@@ -35,9 +34,9 @@ def alone() -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize(("slots", "threads"), [(5, 1), (7, 2), (64, 2)])
 def test_shared_openings_end_as_experts_played_one_by_one(alone, slots, threads):
-    answers = ask(range(2), CRITICALS, slots, threads)
-    np.testing.assert_array_equal([each.returns for each in answers], alone[0])
-    np.testing.assert_array_equal([each.lengths for each in answers], alone[1])
+    outcomes = ask(range(2), CRITICALS, slots, threads)
+    np.testing.assert_array_equal([each.returns for each in outcomes], alone[0])
+    np.testing.assert_array_equal([each.lengths for each in outcomes], alone[1])
 
 
 def test_outcomes_differ_between_experts(alone):

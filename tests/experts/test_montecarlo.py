@@ -11,9 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench.evaluation import rollout
-from dextron_bench.experts import blocks, montecarlo
-from dextron_bench.experts import policies as experts
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts import blocks, montecarlo, policies
 from dextron_bench.experts.blocks import Tally
 from dextron_bench.experts.montecarlo import Search, Share
 from dextron_bench.reaches import setting
@@ -31,7 +30,7 @@ def search(folder: Path, rows: int, slots: int = 12, threads: int = 1, share: Sh
 def test_draws_are_uniform_with_one_expert_in_each_band():
     draws = montecarlo.draw(SOURCE, Search("brief", experts=4, block=500), block=0)
     assert len(draws) == 2000
-    low, high = experts.CRITICAL_DISTANCE
+    low, high = policies.CRITICAL_DISTANCE
     band = ((draws["critical"] - low) / (high - low) * 4).astype(int).to_numpy().reshape(500, 4)
     assert (band == [0, 1, 2, 3]).all()
     assert draws["gain"].between(1.0, 1.5).all()
@@ -62,9 +61,9 @@ def test_rows_are_the_same_at_any_slots_and_threads_in_shares_and_after_interrup
 
 def test_outcomes_are_those_of_a_naive_search(tmp_path):
     found = search(tmp_path, rows=2)
-    agents = [experts.Expert(gain, critical) for gain, critical in zip(found["gain"], found["critical"], strict=True)]
-    cases = [experts.Case(s, e, 0.0) for s, e in zip(setting.from_frame(found), agents, strict=True)]
-    played = dict(rollout.rollout(experts.ExpertAgent(), SOURCE, cases, threads=1))
+    agents = [policies.Expert(gain, critical) for gain, critical in zip(found["gain"], found["critical"], strict=True)]
+    cases = [policies.Case(s, e, 0.0) for s, e in zip(setting.from_frame(found), agents, strict=True)]
+    played = dict(rollout(policies.ExpertAgent(), SOURCE, cases, threads=1))
     assert found["score"].tolist() == [played[i].score for i in range(len(cases))]
     assert found["length"].tolist() == [len(played[i].actions) for i in range(len(cases))]
 

@@ -13,11 +13,11 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dextron_bench.leaderboard.submission import bundle, verification
-from dextron_bench.leaderboard.submission import playing as contest
+from dextron_bench.leaderboard.submission import bundle, playing, verification
+from dextron_bench.leaderboard.submission import entry as submission_entry
 from dextron_bench.leaderboard.submission.verdict import Verdict
 from dextron_bench.methods.isolation.isolated_agent import Limits
-from dextron_bench.runs import run_files as records
+from dextron_bench.runs import result_files, run_files
 from dextron_bench.storage import hashing
 from tests.helpers import tiny_benchmark
 
@@ -60,7 +60,7 @@ class Forgery:
 
     def table(self, change: Callable[[pd.DataFrame], pd.DataFrame]) -> None:
         """Changes the table of episodes."""
-        records.store(self.seed, change(pd.read_parquet(self.seed / records.EPISODES)))
+        run_files.store(self.seed, change(pd.read_parquet(self.seed / run_files.EPISODES)))
 
     def json(self, name: str, change: Callable[[dict[str, Any]], object]) -> None:
         """Changes a JSON file."""
@@ -70,8 +70,8 @@ class Forgery:
 
     def conclude(self) -> None:
         """Makes the result that of the changed episodes."""
-        told = pd.read_parquet(self.seed / records.EPISODES)
-        self.json("seed0/result.json", lambda result: result.update(splits=records.scores(told)))
+        told = pd.read_parquet(self.seed / run_files.EPISODES)
+        self.json("seed0/result.json", lambda result: result.update(splits=result_files.scores(told)))
 
     def checked(self, **how: Any) -> Verdict:
         """What verification finds after all hashes were made right."""
@@ -95,9 +95,9 @@ def submitted(here: Path) -> Iterator[Path]:
             tiny_benchmark.write(here / "splits", ROWS)
             tiny_benchmark.install(here / "splits", patch.setattr)
             (here / "near.py").write_text(AGENT)
-            entry = contest.Entry("near", f"{here}/near.py:Near", tiny_benchmark.NAME, (0, 1))
-            folder = contest.compete(entry, here / "runs", 1, Limits(start=300.0, answer=100.0), threads=1)
-            contest.finish(entry, folder, here / "near.zip")
+            entry = submission_entry.Entry("near", f"{here}/near.py:Near", tiny_benchmark.NAME, (0, 1))
+            folder = playing.compete(entry, here / "runs", 1, Limits(start=300.0, answer=100.0), threads=1)
+            playing.finish(entry, folder, here / "near.zip")
             yield here
     finally:
         tiny_benchmark.forget()

@@ -12,7 +12,8 @@ from pathlib import Path
 import pandas as pd
 
 from dextron_bench.reaches import sources
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits import loading
+from dextron_bench.splits.loading import _catalogue, _table, split_digest
 from tests.helpers.short_reaches import SOURCE
 
 NAME = "synthetic"  # What the source is called, since the command line knows it.
@@ -44,22 +45,22 @@ def write(folder: Path, rows: pd.DataFrame = ROWS) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     rows.to_parquet(folder / f"splits-{NAME}.parquet")
     groups = rows.groupby("split", sort=False)
-    entry = {str(name): {"rows": len(group), "digest": splits.digest(group)} for name, group in groups}
+    entry = {str(name): {"rows": len(group), "digest": split_digest(group)} for name, group in groups}
     (folder / "splits.json").write_text(json.dumps({NAME: entry}))
     return folder
 
 
 def install(folder: Path, put: Callable[[object, str, object], None] = setattr) -> None:
     """Makes the splits in a folder the shipped ones, and the made-up reaches their source."""
-    put(splits, "files", lambda package: folder)
+    put(loading, "files", lambda package: folder)
     put(sources, "SOURCES", {**sources.SOURCES, NAME: lambda: SOURCE})
     forget()
 
 
 def forget() -> None:
     """Makes splits be read again."""
-    splits._catalogue.cache_clear()
-    splits._table.cache_clear()
+    _catalogue.cache_clear()
+    _table.cache_clear()
 
 
 def start(folder: Path, *words: str | Path, **environment: str) -> subprocess.Popen[str]:

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from dextron_bench.evaluation.rollout import Agent
+from dextron_bench.methods.agents import Agent
 from dextron_bench.methods.learners import Arrays, Track, Trainer
 from dextron_bench.world import model
 
@@ -27,7 +27,7 @@ class Toy:
     """Fits a linear map to what a made-up expert did."""
 
     name: ClassVar[str] = "toy"
-    home: ClassVar[str] = ""
+    train_source: ClassVar[str] = ""
 
     rate: float = 0.1
     """Learning rate."""
@@ -62,7 +62,7 @@ class Toy:
         return self.every
 
     @property
-    def rehearsal(self) -> Toy:
+    def timing_run(self) -> Toy:
         """Itself in short."""
         return replace(self, preset="smoke")
 
@@ -80,17 +80,17 @@ class Homely(Toy):
     """Trains where minimum-jerk reaches are."""
 
     name: ClassVar[str] = "homely"
-    home: ClassVar[str] = "minjerk"
+    train_source: ClassVar[str] = "minjerk"
 
 
 @dataclass(frozen=True)
-class ToyHeir:
+class ToyTransfer:
     """Takes what Homely learned to other reaches."""
 
     name: ClassVar[str] = "toy-heir"
 
     preset: Literal["paper", "quick", "smoke"] = "paper"
-    """How long the teacher trains."""
+    """How long the source_policy trains."""
 
     @property
     def label(self) -> str:
@@ -98,7 +98,7 @@ class ToyHeir:
         return self.name
 
     @property
-    def teacher(self) -> Homely:
+    def source_policy(self) -> Homely:
         """Whose policy it is."""
         return Homely(preset=self.preset)
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.methods import weights
-from dextron_bench.runs import run_files as records
-from dextron_bench.scores import standings as leaderboard
+from dextron_bench.runs import result_files
+from dextron_bench.scores import standings
 from tests.helpers import tiny_benchmark, tiny_training
 
 
@@ -24,14 +24,14 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(weights, "place", lambda learner, reaches: tmp_path / "beside" / learner.label / reaches)
     common = ["--quiet", "--no-floors", "--record", "0"]
-    assert cli.main(["run", "--method", "toy_learner:Toy", "--preset", "quick", "--seed", "0", "1", *common]) == 0
-    assert cli.main(["run", "--method", "nothing", *common]) == 0
+    assert main.main(["run", "--method", "toy_learner:Toy", "--preset", "quick", "--seed", "0", "1", *common]) == 0
+    assert main.main(["run", "--method", "nothing", *common]) == 0
     yield tmp_path
     tiny_benchmark.forget()
 
 
 def build(*words: str) -> int:
-    return cli.main(["leaderboard", "build", "--into", "board", *words])
+    return main.main(["leaderboard", "build", "--into", "board", *words])
 
 
 def test_results_curves_and_weights_are_taken_over_as_they_are(here: Path):
@@ -46,7 +46,7 @@ def test_results_curves_and_weights_are_taken_over_as_they_are(here: Path):
 
 def test_the_tables_are_those_of_the_results(here: Path):
     assert build("--runs", "runs") == 0
-    rows = leaderboard.table(records.results(here / "runs"))
+    rows = standings.table(result_files.results(here / "runs"))
     written = pd.read_csv(here / "board/table.csv")
     assert written["method"].tolist() == rows["method"].tolist()
     assert written["return"].to_numpy() == pytest.approx(rows["return"].to_numpy())

@@ -15,13 +15,13 @@ from urllib.parse import unquote
 
 import pytest
 
-from dextron_bench.leaderboard import server as serving
+from dextron_bench.leaderboard import server as leaderboard_server
 
 PAGE = '<a href="../recordings/a%2Bb-success.rrd">success</a>'
 
 
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[serving.Server]:
+def server(tmp_path: Path) -> Iterator[leaderboard_server.Server]:
     """A server of a folder with one recording, a link that leads out of it, and a secret beside."""
     for folder in ("board", "recordings"):
         (tmp_path / folder).mkdir()
@@ -30,7 +30,9 @@ def server(tmp_path: Path) -> Iterator[serving.Server]:
     (tmp_path / "secret.rrd").write_text("secret")
     (tmp_path / "recordings/link.rrd").symlink_to(tmp_path / "secret.rrd")
     (tmp_path / "recordings/notes.txt").write_text("notes")
-    with serving.Server(serving.Site(tmp_path / "board", {"index.html": ("text/html", b"viewer")}), 0) as opened:
+    with leaderboard_server.Server(
+        leaderboard_server.Site(tmp_path / "board", {"index.html": ("text/html", b"viewer")}), 0
+    ) as opened:
         thread = threading.Thread(target=opened.serve_forever, daemon=True)
         thread.start()
         yield opened
@@ -39,11 +41,11 @@ def server(tmp_path: Path) -> Iterator[serving.Server]:
 
 
 @pytest.fixture
-def ask(server: serving.Server) -> Callable[..., tuple[HTTPResponse, bytes]]:
+def ask(server: leaderboard_server.Server) -> Callable[..., tuple[HTTPResponse, bytes]]:
     """What the server answers; the path goes out as it is."""
 
     def ask(path: str, method: str = "GET", host: str | None = None) -> tuple[HTTPResponse, bytes]:
-        connection = HTTPConnection(serving.LOOPBACK, server.server_port, timeout=5)
+        connection = HTTPConnection(leaderboard_server.LOOPBACK, server.server_port, timeout=5)
         connection.putrequest(method, path, skip_host=True)
         if host != "":
             connection.putheader("Host", host or f"127.0.0.1:{server.server_port}")
@@ -56,7 +58,9 @@ def ask(server: serving.Server) -> Callable[..., tuple[HTTPResponse, bytes]]:
     return ask
 
 
-def test_the_page_and_recordings_are_served(server: serving.Server, ask: Callable[..., tuple[HTTPResponse, bytes]]):
+def test_the_page_and_recordings_are_served(
+    server: leaderboard_server.Server, ask: Callable[..., tuple[HTTPResponse, bytes]]
+):
     answer, body = ask("/")
     assert (answer.status, answer.headers["Content-Type"]) == (200, "text/html; charset=utf-8")
     link = re.search(r'href="/viewer/\?url=([^"]+)"', body.decode())
@@ -69,7 +73,7 @@ def test_the_page_and_recordings_are_served(server: serving.Server, ask: Callabl
 
 
 def test_without_a_viewer_recordings_are_downloaded(
-    server: serving.Server, ask: Callable[..., tuple[HTTPResponse, bytes]]
+    server: leaderboard_server.Server, ask: Callable[..., tuple[HTTPResponse, bytes]]
 ):
     server.site.viewer.clear()
     assert ask("/")[1].decode() == PAGE
@@ -108,7 +112,7 @@ def test_one_may_look_but_not_write(ask: Callable[..., tuple[HTTPResponse, bytes
         assert ask("/", method=method)[0].status == 501
 
 
-def test_other_machines_cannot_connect(server: serving.Server):
+def test_other_machines_cannot_connect(server: leaderboard_server.Server):
     assert server.server_address[0] == "127.0.0.1"
     with socket.socket() as other:
         other.settimeout(2)
@@ -135,7 +139,7 @@ def test_it_serves_the_viewer_until_it_is_interrupted():
     with subprocess.Popen(words, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
         assert served.stdout
         port = int(served.stdout.readline().strip().rpartition(":")[2].strip("/"))
-        connection = HTTPConnection(serving.LOOPBACK, port, timeout=10)
+        connection = HTTPConnection(leaderboard_server.LOOPBACK, port, timeout=10)
         connection.request("GET", "/viewer/re_viewer_bg.wasm")
         answer = connection.getresponse()
         assert (answer.status, answer.headers["Content-Type"]) == (200, "application/wasm")

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from dextron_bench import recording
-from dextron_bench.cli import main as cli
-from dextron_bench.leaderboard import add as merging
-from dextron_bench.leaderboard.submission import playing as contest
+from dextron_bench.cli import main
+from dextron_bench.leaderboard import add
+from dextron_bench.leaderboard.submission import entry
 
 
 def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
@@ -29,24 +29,24 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
         '{"near": 0.05}',
         "--quiet",
     ]
-    assert cli.main(words) == 0
+    assert main.main(words) == 0
     assert "mine-synthetic.zip" in capsys.readouterr().out
-    assert cli.main(["leaderboard", "verify", "mine-synthetic.zip", "--rerun"]) == 0
+    assert main.main(["leaderboard", "verify", "mine-synthetic.zip", "--rerun"]) == 0
     assert "re-run; 4 of 4 episodes equal bit for bit" in capsys.readouterr().out
-    assert cli.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board"]) == 0
+    assert main.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board"]) == 0
     assert "| `mine` |" in (tmp_path / "board" / "README.md").read_text()
-    assert cli.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board"]) == 2
+    assert main.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board"]) == 2
     assert "--replace puts this one in its place" in capsys.readouterr().err
-    assert cli.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board", "--replace"]) == 0
-    assert cli.main(["leaderboard", "verify", "--all", "--board", "board"]) == 0
+    assert main.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board", "--replace"]) == 0
+    assert main.main(["leaderboard", "verify", "--all", "--board", "board"]) == 0
     assert "mine, synthetic reaches, seed 0: replayed, 4 of 4 episodes" in capsys.readouterr().out
     again = ["submit", f"{submitted}/near.py:Near", "--name", "other", "--seed", "0", "--board", "board", "--quiet"]
-    assert cli.main(again) == 0
+    assert main.main(again) == 0
     told = capsys.readouterr().out
     assert told.count("│ mine ") == told.count("│ other ") == 2  # On `test` and `unseen-reach`.
     file = tmp_path / "board/results/mine/synthetic/seed0/result.json"
     file.write_text(file.read_text().replace("0.0", "20.0", 1))
-    assert cli.main(["leaderboard", "verify", "--all", "--board", "board"]) == 1
+    assert main.main(["leaderboard", "verify", "--all", "--board", "board"]) == 1
     told = capsys.readouterr().out
     assert "NOT what its episodes give" in told
     assert "table.csv differs" in told
@@ -56,26 +56,26 @@ def test_seeds_that_a_submission_lost_or_won_on_the_board_are_noticed(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
     board = tmp_path / "board"
-    assert cli.main(["leaderboard", "add", str(submitted / "near.zip"), "--board", str(board)]) == 0
+    assert main.main(["leaderboard", "add", str(submitted / "near.zip"), "--board", str(board)]) == 0
     place = board / "results/near/synthetic"
     shutil.copytree(place / "seed0", place / "seed2")
-    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
+    assert main.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
     told = capsys.readouterr().out
     assert "lies in near/synthetic/seed2, but is of near, synthetic reaches, seed 0" in told
     assert "has seed0, seed1, seed2 where its manifest has seed0, seed1" in told
     shutil.rmtree(place / "seed2")
     shutil.rmtree(place / "seed1")
-    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
+    assert main.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
     assert "has seed0 where its manifest has seed0, seed1" in capsys.readouterr().out
 
 
 def test_an_addition_that_was_cut_off_is_made_again(submitted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     board, words = tmp_path / "board", ["leaderboard", "add", str(submitted / "near.zip"), "--board"]
-    assert cli.main([*words, str(board)]) == 0
+    assert main.main([*words, str(board)]) == 0
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
-        assert cli.main([*words, str(board), "--replace"]) == 130
-    assert cli.main([*words, str(board), "--replace"]) == 0
+        assert main.main([*words, str(board), "--replace"]) == 130
+    assert main.main([*words, str(board), "--replace"]) == 0
     assert sorted(place.name for place in (board / "results/near").iterdir()) == ["synthetic"]
 
 
@@ -85,19 +85,19 @@ def test_any_episode_of_a_bundle_is_recorded_where_it_is_looked_at(
     """The bundle has the recording of row 0 alone; row 2 of `test` is the one that failed."""
     monkeypatch.chdir(tmp_path)
     bundle = str(submitted / "near.zip")
-    assert cli.main(["view", bundle, "--print"]) == 0
+    assert main.main(["view", bundle, "--print"]) == 0
     assert {Path(line).name for line in capsys.readouterr().out.split()} == {"test-0000.rrd", "unseen-reach-0000.rrd"}
-    assert cli.main(["view", bundle, "--print", "--failed", "--seed", "1", "--quiet"]) == 0
+    assert main.main(["view", bundle, "--print", "--failed", "--seed", "1", "--quiet"]) == 0
     [file] = capsys.readouterr().out.split()
     assert file.endswith("seed1/recordings/test-0002.rrd")
     told = recording.read(Path(file))
     assert (told.properties["method"], told.episode.score) == ("near", 0.0)
-    assert cli.main(["view", bundle, "--print", "--failed", "--seed", "1", "--quiet"]) == 0
+    assert main.main(["view", bundle, "--print", "--failed", "--seed", "1", "--quiet"]) == 0
     assert capsys.readouterr().out.split() == [file]
     cut = tmp_path / "cut.zip"
     cut.write_bytes(Path(bundle).read_bytes()[:-30])
     for place, why in ((cut, "is no whole zip file"), (tmp_path / "none.zip", "there is no file")):
-        assert cli.main(["view", str(place), "--print"]) == 2
+        assert main.main(["view", str(place), "--print"]) == 2
         assert why in capsys.readouterr().err
     assert sorted(path.name for path in (tmp_path / "runs/submissions/.bundles").iterdir()) == [Path(file).parts[3]]
 
@@ -105,16 +105,16 @@ def test_any_episode_of_a_bundle_is_recorded_where_it_is_looked_at(
 def test_a_board_of_baselines_is_run_again(submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """Dice fall otherwise when only some rows are played, so that all are."""
     runs, board = str(tmp_path / "runs"), tmp_path / "board"
-    assert cli.main(["run", "--method", "exp", "--record", "0", "--runs", runs, "--quiet"]) == 0
-    assert cli.main(["leaderboard", "build", "--runs", runs, "--into", str(board)]) == 0
+    assert main.main(["run", "--method", "exp", "--record", "0", "--runs", runs, "--quiet"]) == 0
+    assert main.main(["leaderboard", "build", "--runs", runs, "--into", str(board)]) == 0
     capsys.readouterr()
-    assert cli.main(["leaderboard", "verify", "--all", "--rows", "1", "--board", str(board)]) == 0
+    assert main.main(["leaderboard", "verify", "--all", "--rows", "1", "--board", str(board)]) == 0
     told = capsys.readouterr().out
     assert "exp, synthetic reaches, seed 0: run again, 2 of 4 episodes, all equal" in told
     assert "random, synthetic reaches, seed 0: run again" in told
     copied = board / "results/best/synthetic/seed0"
     shutil.copytree(board / "results/exp/synthetic/seed0", copied)
-    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
+    assert main.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
     assert "lies in best/synthetic/seed0, but was made by exp" in capsys.readouterr().out
     shutil.rmtree(copied.parents[1])
     file = board / "results/exp/synthetic/seed0/result.json"
@@ -122,16 +122,16 @@ def test_a_board_of_baselines_is_run_again(submitted: Path, tmp_path: Path, caps
     told = json.loads(sound)
     told["splits"]["test"]["causes"] = {"slipped": 3}
     file.write_text(json.dumps(told))
-    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
+    assert main.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
     assert "test says causes {'slipped': 3}; run again it is {'solved': " in capsys.readouterr().out
     told["splits"]["test"]["scores"] += [20.0]
     file.write_text(json.dumps(told))
-    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 2
+    assert main.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 2
     assert "test has not one score and one hash of actions for each row" in capsys.readouterr().out
     file.write_text(sound.replace("20.0", "19.0", 1))
-    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
+    assert main.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
     assert "says return 19; run again it is 20" in capsys.readouterr().out
-    assert cli.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "none"]) == 2
+    assert main.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "none"]) == 2
     assert "its methods: exp, nothing, random" in capsys.readouterr().err
 
 
@@ -143,23 +143,23 @@ def test_what_cannot_be_submitted_is_said(submitted: Path, capsys: pytest.Captur
         (["--name", "a", "--settings", "1"], "settings are a JSON object"),
         (["--name", "a", "--settings", "{"], "--settings is no JSON"),
     ):
-        assert cli.main(["submit", f"{submitted}/near.py:Near", *words]) == 2
+        assert main.main(["submit", f"{submitted}/near.py:Near", *words]) == 2
         assert why in capsys.readouterr().err
-    assert cli.main(["leaderboard", "verify"]) == 2
+    assert main.main(["leaderboard", "verify"]) == 2
     assert "name a submission, or give --all" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["exp", "Exp", "rlil-0.3", "RLIL-0.1-mine", "exp\n", "first", "FIRST"])
 def test_names_that_are_or_look_like_anothers_are_refused(name: str, tmp_path: Path):
     (tmp_path / "results" / "first" / "real" / "seed0").mkdir(parents=True)
-    with pytest.raises(contest.BadSubmission):
-        merging.check_name(name, "synthetic", tmp_path, replace=True)
-    merging.check_name("first-of-mine", "synthetic", tmp_path, replace=False)
+    with pytest.raises(entry.BadSubmission):
+        add.check_name(name, "synthetic", tmp_path, replace=True)
+    add.check_name("first-of-mine", "synthetic", tmp_path, replace=False)
 
 
 def test_settings_of_an_installed_method_are_those_with_which_it_can_be_made_again():
-    settled = contest.settle("omega", '{"near": 0.1}', "synthetic")
+    settled = entry.settle("omega", '{"near": 0.1}', "synthetic")
     assert settled["near"] == 0.1
     assert len(settled["sha256"]) == 64
-    assert contest.settle("omega", json.dumps(settled), "synthetic") == settled
-    assert contest.settle("mine.py:Mine", '{"near": 0.1}', "synthetic") == {"near": 0.1}
+    assert entry.settle("omega", json.dumps(settled), "synthetic") == settled
+    assert entry.settle("mine.py:Mine", '{"near": 0.1}', "synthetic") == {"near": 0.1}

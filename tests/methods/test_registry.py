@@ -11,8 +11,8 @@ import pytest
 
 from baselines.exp import Exp
 from baselines.floors import Nothing, Random
-from dextron_bench.evaluation.rollout import AgentError
-from dextron_bench.methods import registry as methods
+from dextron_bench.methods import registry
+from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.registry import UnknownMethod
 
 AGENT = """
@@ -38,26 +38,26 @@ def file(tmp_path: Path) -> Callable[[str], Path]:
 
 
 def test_installed_methods_by_name():
-    assert {"exp", "nothing", "random"} <= set(methods.known())
-    assert methods.find("exp") is Exp
-    assert methods.describe("exp") == 'Replays the expert that solved each setting (paper, fig. 4a, "EXP").'
+    assert {"exp", "nothing", "random"} <= set(registry.known())
+    assert registry.find("exp") is Exp
+    assert registry.describe("exp") == 'Replays the expert that solved each setting (paper, fig. 4a, "EXP").'
 
 
-@pytest.mark.parametrize("name", methods.known())
+@pytest.mark.parametrize("name", registry.known())
 def test_every_installed_method_can_be_made_and_has_plain_settings(name: str):
-    found = methods.create(name)
+    found = registry.create(name)
     assert found.name == name
-    assert all(isinstance(value, (str, int, float, bool, tuple)) for value in methods.settings(found).values())
-    assert methods.describe(name).endswith(".")
+    assert all(isinstance(value, (str, int, float, bool, tuple)) for value in registry.settings(found).values())
+    assert registry.describe(name).endswith(".")
 
 
 def test_by_module():
-    assert methods.find("baselines.floors:Nothing") is Nothing
+    assert registry.find("baselines.floors:Nothing") is Nothing
 
 
 def test_by_file_which_is_executed_once(file: Callable[[str], Path]):
     place = file(AGENT)
-    first, second = methods.find(f"{place}:Mine"), methods.find(f"{place}:Mine")
+    first, second = registry.find(f"{place}:Mine"), registry.find(f"{place}:Mine")
     assert first is second
     assert first.name == "mine"
     assert place.with_suffix(".log").read_text() == "executed\n"
@@ -65,12 +65,12 @@ def test_by_file_which_is_executed_once(file: Callable[[str], Path]):
 
 def test_the_origin_of_a_file_changes_with_its_content(file: Callable[[str], Path]):
     spec = f"{file(AGENT)}:Mine"
-    before = methods.origin(spec)
+    before = registry.origin(spec)
     assert before["class"] == "mine.py:Mine"
     file(AGENT + "# Another thought.\n")
-    assert methods.origin(spec)["sha256"] != before["sha256"]
+    assert registry.origin(spec)["sha256"] != before["sha256"]
     assert (
-        methods.origin("exp") == methods.origin("baselines.exp:Exp") == {"class": "baselines.exp:Exp", "sha256": None}
+        registry.origin("exp") == registry.origin("baselines.exp:Exp") == {"class": "baselines.exp:Exp", "sha256": None}
     )
 
 
@@ -78,7 +78,7 @@ def test_an_unknown_name_lists_the_others():
     with pytest.raises(
         UnknownMethod, match=r"^no method 'xep'; choose from .*exp, .*nothing, .*random.*, or give module"
     ):
-        methods.find("xep")
+        registry.find("xep")
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_an_unknown_name_lists_the_others():
 )
 def test_what_is_no_method_is_named(spec: str, complaint: str):
     with pytest.raises(UnknownMethod) as caught:
-        methods.find(spec)
+        registry.find(spec)
     assert complaint in str(caught.value)
     assert spec in str(caught.value)
 
@@ -115,25 +115,25 @@ def test_a_file_that_fails_says_how(file: Callable[[str], Path], text: str, comp
     spec = f"{file(text)}:Mine"
     for _ in range(2):  # A failed import leaves nothing that looks imported.
         with pytest.raises(UnknownMethod) as caught:
-            methods.find(spec)
+            registry.find(spec)
         assert complaint in str(caught.value)
 
 
 def test_a_method_that_cannot_be_made_says_why(file: Callable[[str], Path]):
     place = file("class Mine:\n    name = 'mine'\n    def __init__(self, size): ...\n    def agent(self, seed): ...\n")
     with pytest.raises(AgentError, match=r"^making method .* raised TypeError: .*'size'"):
-        methods.create(f"{place}:Mine")
+        registry.create(f"{place}:Mine")
 
 
 def test_a_broken_installed_method_is_told_of_in_the_list(monkeypatch: pytest.MonkeyPatch):
-    broken = EntryPoints([EntryPoint("broken", "nosuch.module:Agent", methods.GROUP)])
-    monkeypatch.setattr(methods, "entry_points", lambda **params: broken.select(**params))
-    assert methods.known() == ("broken",)
-    assert methods.describe("broken").startswith("method 'broken' cannot be imported: ModuleNotFoundError")
+    broken = EntryPoints([EntryPoint("broken", "nosuch.module:Agent", registry.GROUP)])
+    monkeypatch.setattr(registry, "entry_points", lambda **params: broken.select(**params))
+    assert registry.known() == ("broken",)
+    assert registry.describe("broken").startswith("method 'broken' cannot be imported: ModuleNotFoundError")
 
 
 def test_settings_are_the_fields():
-    assert methods.settings(Random()) == {}
+    assert registry.settings(Random()) == {}
 
 
 def test_equal_seeds_act_equally_and_others_do_not():

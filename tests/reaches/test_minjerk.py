@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dextron_bench.experts import policies as experts
+from dextron_bench.experts import policies
 from dextron_bench.reaches.minjerk import LIFT_STEPS, REACH_STEPS, Draw, MinjerkSource, band, carrier, leg
 from dextron_bench.reaches.reach import ReachError, palm_centre
 from dextron_bench.reaches.setting import Setting, UnknownReach
@@ -73,7 +73,7 @@ def test_the_palm_centre_comes_within_the_distance_at_which_experts_close():
     path = MinjerkSource().path(at("minjerk-000007"))
     centre = palm_centre(path.positions, path.quaternions)[250]
     np.testing.assert_allclose(centre[:2], [-0.015, 0.005], atol=1e-4)
-    assert np.hypot(*centre[:2]) < experts.ALWAYS_CLOSE
+    assert np.hypot(*centre[:2]) < policies.ALWAYS_CLOSE
 
 
 def test_a_leg_is_the_minimum_jerk_polynomial():
@@ -121,8 +121,8 @@ def test_the_papers_expert_lifts_the_bottle():
     for _ in range(375):
         step = engine.step(ids, actions)
         scores += step.rewards
-        closing = experts.closes(task.distance(step.states), first, critical)
-        actions = experts.law(task.closure(step.states), closing, gain)
+        closing = policies.closes(task.distance(step.states), first, critical)
+        actions = policies.law(task.closure(step.states), closing, gain)
     assert scores.tolist() == [task.SUCCESS] * 3
 
 

@@ -20,13 +20,10 @@ from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.reaches import reach
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.recording import blueprint as layout
-from dextron_bench.recording import episode_file as archive
-from dextron_bench.recording import rrd_file as storage
-from dextron_bench.recording import scene
+from dextron_bench.recording import blueprint, episode_file, rrd_file, scene
 from dextron_bench.success.network import GRID
 from dextron_bench.world import model, task
 
@@ -135,7 +132,7 @@ def test_what_is_no_recording_is_named(file: Path) -> None:
 
 
 def test_a_recording_of_something_else_is_named(file: Path) -> None:
-    storage.save(file, layout.lines(), "other", layout.blueprint())
+    rrd_file.save(file, blueprint.lines(), "other", blueprint.blueprint())
     with pytest.raises(recording.BrokenRecording, match="no digest"):
         recording.read(file)
 
@@ -146,9 +143,9 @@ def chunks_of(file: Path) -> list[Chunk]:
 
 def forge(file: Path, chunks: list[Chunk]) -> None:
     """Writes chunks with the digest that they need."""
-    identity = archive.digest(archive.lines(chunks))
+    identity = episode_file.digest(episode_file.lines(chunks))
     digest = Chunk.from_property("digest", rr.AnyValues(sha256=identity))
-    storage.save(file, [*chunks, digest], identity, layout.blueprint())
+    rrd_file.save(file, [*chunks, digest], identity, blueprint.blueprint())
 
 
 def test_states_of_uneven_length_make_no_episode(whole: Path, file: Path) -> None:
@@ -218,7 +215,9 @@ def test_other_layouts_are_those_of_other_applications(tmp_path: Path) -> None:
     """The viewer has one layout an application: that of the last file it was given."""
     files = [tmp_path / name for name in ("plain.rrd", "foretold.rrd", "pair.rrd")]
     recording.write(files[0], episode(2), PATH, {})
-    recording.write(files[1], episode(2), PATH, {}, Insight(GRID, np.full((2, 51), 0.5), np.zeros(2), np.zeros(2), 2.0))
+    recording.write(
+        files[1], episode(2), PATH, {}, StepPredictions(GRID, np.full((2, 51), 0.5), np.zeros(2), np.zeros(2), 2.0)
+    )
     recording.pair(files[2], *files[:2])
     found = [RrdReader(file).recordings()[0].application_id for file in files]
     assert found == ["dextron-bench-plain", "dextron-bench", "dextron-bench-pairs"]
@@ -234,7 +233,7 @@ def test_it_opens_with_its_own_layout(whole: Path) -> None:
     [layout_of] = RrdReader(whole).blueprints()
     assert told == [layout_of.recording_id]
     views = [str(each.entity_path) for each in RrdReader(whole).stream(store=layout_of).to_chunks()]
-    assert sum(path.startswith("/view/") and path.count("/") == 2 for path in views) == 1 + 1 + len(layout.PLOTS)
+    assert sum(path.startswith("/view/") and path.count("/") == 2 for path in views) == 1 + 1 + len(blueprint.PLOTS)
 
 
 def test_rerun_switched_off_is_an_error_and_not_an_empty_file(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,12 +278,12 @@ def test_a_recording_of_150_steps_stays_under_600_kb(file: Path) -> None:
 def test_the_outcome_is_told_in_words(rewards: np.ndarray, ends: dict[str, Any], told: str) -> None:
     played = episode(len(rewards), **ends)
     played.rewards[:] = rewards
-    assert layout.outcome(played) == told
+    assert blueprint.outcome(played) == told
 
 
 def test_plots_show_distance_and_height_in_metres(whole: Path) -> None:
     states = recording.read(whole).episode.states
-    chunk = next(chunk for chunk in layout.signals(states) if chunk.entity_path == "/signals/metres")
+    chunk = next(chunk for chunk in blueprint.signals(states) if chunk.entity_path == "/signals/metres")
     values = np.array(chunk.to_record_batch().column("Scalars:scalars").to_pylist())
     np.testing.assert_array_equal(values[:, 0], task.distance(states))
     np.testing.assert_array_equal(values[:, 1], states[:, 2])

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dextron_bench.recording import film
+from dextron_bench.recording import film as recording_film
 from dextron_bench.recording.film import BadLook, Look, NoEncoder
 from dextron_bench.world import model
-from dextron_bench.world.rendering import renderer as appearance
+from dextron_bench.world.rendering import renderer
 
 SMALL = Look(64, 48)
 
@@ -55,10 +55,10 @@ def pictures(file: Path) -> tuple[list[np.ndarray], float]:
     ],
 )
 def test_a_film_shows_these_steps_at_this_rate(count: int, rate: float, speed: float, shown: list[int], fps: float):
-    assert film.steps(count, rate, speed) == (shown, pytest.approx(fps))
+    assert recording_film.steps(count, rate, speed) == (shown, pytest.approx(fps))
 
 
-@pytest.mark.parametrize(("write", "count"), [(film.mp4, 26), (film.gif, 14)])
+@pytest.mark.parametrize(("write", "count"), [(recording_film.mp4, 26), (recording_film.gif, 14)])
 def test_a_film_takes_as_long_as_the_episode_and_shows_it(tmp_path: Path, write: Callable[..., None], count: int):
     file, told = tmp_path / f"film.{write.__name__}", []
     write(file, lifting(26), SMALL, lambda *parts: told.append(parts))
@@ -66,14 +66,14 @@ def test_a_film_takes_as_long_as_the_episode_and_shows_it(tmp_path: Path, write:
     assert told == [(k + 1, count) for k in range(count)]
     assert len(shown) == count
     assert lasts == pytest.approx(0.52, abs=0.041)  # 26 states, 0.02 s each.
-    drawn = appearance.frames(lifting(26)[[0, -1]], 64, 48)
+    drawn = renderer.frames(lifting(26)[[0, -1]], 64, 48)
     for picture, state in zip((shown[0], shown[-1]), drawn, strict=True):
         assert np.abs(picture.astype(int) - state).mean() < 6.0
     assert np.abs(shown[0].astype(int) - shown[-1]).mean() > 0.5
 
 
 def test_slow_motion_takes_longer(tmp_path: Path):
-    film.gif(tmp_path / "slow.gif", lifting(4), Look(64, 48, speed=0.3), lambda done, total: None)
+    recording_film.gif(tmp_path / "slow.gif", lifting(4), Look(64, 48, speed=0.3), lambda done, total: None)
     shown, lasts = pictures(tmp_path / "slow.gif")
     assert (len(shown), lasts) == (4, pytest.approx(0.27))  # 4 at 15 a second; a GIF counts hundredths.
 
@@ -95,17 +95,17 @@ def test_a_film_that_cannot_be_is_told(look: dict[str, float], told: str):
 
 
 def test_an_unknown_camera_names_the_known():
-    with pytest.raises(appearance.UnknownCamera, match="no camera 'left'; choose from behind, front"):
+    with pytest.raises(renderer.UnknownCamera, match="no camera 'left'; choose from behind, front"):
         Look(camera="left")
 
 
 def test_without_an_encoder_the_line_says_how_to_get_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(NoEncoder, match=r"`pip install av`; or write a \.gif"):
-        film.mp4(tmp_path / "film.mp4", lifting(3), SMALL, lambda done, total: None)
+        recording_film.mp4(tmp_path / "film.mp4", lifting(3), SMALL, lambda done, total: None)
 
 
-@pytest.mark.parametrize("write", [film.mp4, film.gif])
+@pytest.mark.parametrize("write", [recording_film.mp4, recording_film.gif])
 def test_without_graphics_nothing_else_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], write: Callable[..., None]
 ):
@@ -113,6 +113,6 @@ def test_without_graphics_nothing_else_is_said(
         monkeypatch.setenv("MUJOCO_GL", kind)
         monkeypatch.delenv("DISPLAY", raising=False)
         monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-        with pytest.raises(appearance.NoGraphics, match="cannot draw off screen"):
+        with pytest.raises(renderer.NoGraphics, match="cannot draw off screen"):
             write(tmp_path / "film", lifting(3), SMALL, lambda done, total: None)
     assert capfd.readouterr() == ("", "")

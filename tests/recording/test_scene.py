@@ -12,7 +12,7 @@ from rerun.chunk import Chunk, RrdReader
 from dextron_bench import recording
 from dextron_bench.recording import scene, shapes
 from dextron_bench.world import model, task
-from dextron_bench.world.rendering import visuals as dressing
+from dextron_bench.world.rendering import visuals
 from tests.recording.test_episode_file import PATH, episode
 
 
@@ -59,7 +59,7 @@ def columns(chunk: Chunk) -> dict[str, np.ndarray]:
 
 def test_the_fingers_shapes_are_where_the_physics_has_them() -> None:
     """MuJoCo's own places and turns of all 27; Rerun's capsules run from their start along +z, MuJoCo's are centred."""
-    made, drawn = episode(1), dressing.dressed()
+    made, drawn = episode(1), visuals.visual_model()
     data = mujoco.MjData(drawn)
     data.qpos[:] = made.states[1, : drawn.nq]
     mujoco.mj_kinematics(drawn, data)

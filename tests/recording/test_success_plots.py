@@ -11,12 +11,11 @@ from rerun.chunk import RrdReader
 
 from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.predictions import Insight, expert_actions
+from dextron_bench.evaluation.predictions import StepPredictions, expert_actions
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.recording import scene
-from dextron_bench.recording import success_plots as foresight
+from dextron_bench.recording import scene, success_plots
 from dextron_bench.success.network import GRID
 from dextron_bench.world import model
 from tests.helpers.short_reaches import SETTINGS, SOURCE
@@ -25,12 +24,12 @@ SETTING = Setting("05_fr_05", 0.01, -0.02, 1 / 3)
 CASE = Case(SETTINGS[0], Expert(1.2, 0.3), 0.1)
 
 
-def noise(steps: int) -> tuple[Episode, Insight]:
+def noise(steps: int) -> tuple[Episode, StepPredictions]:
     rng = np.random.default_rng(0)
     states = np.concatenate([model.half_closed(), np.zeros(23)]) + rng.normal(0.0, 0.01, (steps + 1, model.STATE))
     episode = Episode(SETTING, states, rng.uniform(-1, 1, (steps, 1)), np.zeros(steps), False, True)
     curves, chances, experts = rng.random((steps, 51)), rng.random(steps), rng.uniform(-1, 1, steps)
-    return episode, Insight(GRID, curves, chances, experts, duration=steps - 20.0)
+    return episode, StepPredictions(GRID, curves, chances, experts, duration=steps - 20.0)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +67,7 @@ def test_curves_chances_and_actions_come_back(columns: dict[str, pa.RecordBatch]
 def test_a_changed_curve_is_noticed(tmp_path: Path):
     """The digest covers what the model thought: the same episode with another thought is another content."""
     episode, insight = noise(3)
-    changed = Insight(GRID, insight.curves.copy(), insight.chances, insight.experts, insight.duration)
+    changed = StepPredictions(GRID, insight.curves.copy(), insight.chances, insight.experts, insight.duration)
     changed.curves[1, 7] += 0.25
     told = []
     for each in (insight, changed):
@@ -81,14 +80,14 @@ def test_a_changed_curve_is_noticed(tmp_path: Path):
 def test_ridges_rise_step_by_step_and_are_green_where_the_outcome_is_foretold():
     curves = np.zeros((2, 3))
     curves[1] = [0.0, 1.0, 0.5]
-    seen = Insight(GRID, curves, np.array([0.2, 0.9]), np.zeros(2), duration=2.0)
-    chunks = list(foresight.ridge(seen, np.array([-1.0, 0.5]), last=1, success=True))
+    seen = StepPredictions(GRID, curves, np.array([0.2, 0.9]), np.zeros(2), duration=2.0)
+    chunks = list(success_plots.ridge(seen, np.array([-1.0, 0.5]), last=1, success=True))
     ridge = next(chunk for chunk in chunks if chunk.entity_path == "/ridge/curves").to_record_batch().to_pydict()
     strips, colours = ridge["LineStrips2D:strips"][0], ridge["LineStrips2D:colors"][0]
     np.testing.assert_allclose(strips[0], [[-1, 0], [0, 0], [1, 0]])
     np.testing.assert_allclose(strips[1], [[-1, -5.0], [0, -5.4], [1, -5.2]], atol=1e-6)
-    red, green = (int.from_bytes([*colour, 255]) for colour in (foresight.WRONG, foresight.RIGHT))
-    assert colours == [red, green, *[int.from_bytes([*foresight.TICK, 255])] * 2]
+    red, green = (int.from_bytes([*colour, 255]) for colour in (success_plots.WRONG, success_plots.RIGHT))
+    assert colours == [red, green, *[int.from_bytes([*success_plots.TICK, 255])] * 2]
     np.testing.assert_allclose(strips[3], [[0.5, -5.0], [0.5, -5.2]], atol=1e-6)
 
 

@@ -12,7 +12,7 @@ import pytest
 import rerun as rr
 
 from dextron_bench import recording
-from dextron_bench.recording import reader_process as glance
+from dextron_bench.recording import reader_process
 from dextron_bench.recording.summaries import NEEDED
 from tests.recording.test_episode_file import PATH, PROPERTIES, SETTING, episode
 
@@ -107,7 +107,7 @@ def test_a_file_that_ends_the_process_that_reads_it_is_named_and_the_rest_is_rea
     needed = dict.fromkeys(NEEDED, 0)
     script.write_text(DEADLY % needed)
     shutil.copy(whole, deadly)
-    monkeypatch.setattr(glance, "__file__", str(script))
+    monkeypatch.setattr(reader_process, "__file__", str(script))
     found = damages([deadly, whole, deadly, deadly, whole, deadly])
     assert [told[:44] for told in found] == [
         "is damaged (reading it ended the process tha" * bad for bad in (1, 0, 1, 1, 0, 1)
@@ -132,11 +132,11 @@ def test_files_of_unknown_origin_are_screened_by_one_process(whole: Path, monkey
 def test_a_reader_that_does_not_start_is_no_damage(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     script = tmp_path / "glance.py"
     script.write_text("raise SystemExit('no rerun here')")
-    monkeypatch.setattr(glance, "__file__", str(script))
+    monkeypatch.setattr(reader_process, "__file__", str(script))
     with pytest.raises(recording.ReaderError, match="recordings cannot be read: no rerun here"):
         damages([whole])
 
 
 def test_nothing_is_no_work(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(glance, "__file__", "nowhere")
+    monkeypatch.setattr(reader_process, "__file__", "nowhere")
     assert damages([]) == []

@@ -17,10 +17,9 @@ from dextron_bench.evaluation.replay import replay
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.setting import from_frame
-from dextron_bench.runs import execution as run
-from dextron_bench.runs import run_files as records
-from dextron_bench.runs.execution import Plan
-from dextron_bench.splits import loading as splits
+from dextron_bench.runs import execution, result_files
+from dextron_bench.runs.plans import Plan
+from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import atomic, provenance
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
@@ -50,7 +49,7 @@ def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def play(folder: Path, plan: Plan = PLAN) -> Path:
-    return run.execute(plan, folder, threads=1)
+    return execution.execute(plan, folder, threads=1)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -73,7 +72,7 @@ def test_a_run_again_computes_nothing_and_changes_no_byte(tmp_path: Path, monkey
     folder = play(tmp_path)
     before = contents(folder)
     assert set(before) == {"config.json", "provenance.json", "episodes.parquet", "result.json"}
-    monkeypatch.setattr(run, "rollout", forbid)
+    monkeypatch.setattr(execution, "rollout", forbid)
     assert play(tmp_path) == folder == tmp_path / "exp" / "synthetic" / "seed0"
     assert contents(folder) == before
 
@@ -87,7 +86,7 @@ def test_killed_between_splits_it_ends_with_the_same_bytes(tmp_path: Path, monke
         return rollout(ExpertAgent(), tiny_benchmark.SOURCE, cases, **options)
 
     with monkeypatch.context() as patched:
-        patched.setattr(run, "rollout", killed)
+        patched.setattr(execution, "rollout", killed)
         with pytest.raises(KeyboardInterrupt):
             play(tmp_path / "broken")
     broken = tmp_path / "broken" / "exp" / "synthetic" / "seed0"
@@ -116,7 +115,7 @@ def test_killed_between_its_first_two_files_it_still_ends(tmp_path: Path, monkey
 
 def test_the_result_is_what_the_episodes_say(tmp_path: Path):
     folder = play(tmp_path)
-    episodes, result = pd.read_parquet(folder / "episodes.parquet"), records.read_result(folder / "result.json")
+    episodes, result = pd.read_parquet(folder / "episodes.parquet"), result_files.read_result(folder / "result.json")
     assert (result["method"], result["reaches"], result["seed"]) == ("exp", "synthetic", 0)
     assert set(result["splits"]) == {"val", "test"}
     for name, found in result["splits"].items():
@@ -125,7 +124,7 @@ def test_the_result_is_what_the_episodes_say(tmp_path: Path):
         assert found["scores"] == rows["score"].tolist() == [20.0] * len(rows)
         assert set(rows["cause"]) == {"solved"}
         assert rows["closing_lag"].between(0.0, 0.12).all()
-        assert found["digest"] == splits.load("synthetic", name).digest
+        assert found["digest"] == load_split("synthetic", name).digest
         assert found["failed"] == 0
     assert episodes["success"].all()
 
@@ -147,7 +146,7 @@ def test_a_recording_reads_back_as_the_episode(tmp_path: Path):
     assert [file.name for file in (folder / "recordings").iterdir()] == ["test-0000.rrd"]
     manifest = json.loads((folder / "recordings.json").read_text())
     recorded = recording.read(folder / "recordings" / "test-0000.rrd", sha256=manifest["test-0000.rrd"])
-    split = splits.load("synthetic", "test")
+    split = load_split("synthetic", "test")
     _, episode = next(iter(rollout(ExpertAgent(), tiny_benchmark.SOURCE, split.cases[:1], threads=1)))
     assert recorded.episode.setting == split.cases[0].setting
     for name in ("states", "actions", "rewards"):
@@ -167,11 +166,11 @@ def test_a_missing_recording_is_made_and_one_that_cannot_be_is_not_missed(
     plan = Plan(spec, "synthetic", ("open",), seed=0, record=1)
     folder = play(tmp_path, plan)
     assert made == []  # An episode that failed before its first step.
-    assert records.read_result(folder / "result.json")["splits"]["open"] == {
-        "digest": splits.load("synthetic", "open").digest, "scores": [0.0], "failed": 1,
+    assert result_files.read_result(folder / "result.json")["splits"]["open"] == {
+        "digest": load_split("synthetic", "open").digest, "scores": [0.0], "failed": 1,
         "causes": {"agent failed": 1}, "closing_lag": None, "actions": ["af5570f5a181"],
     }  # fmt: skip
-    monkeypatch.setattr(run, "rollout", forbid)
+    monkeypatch.setattr(execution, "rollout", forbid)
     play(tmp_path, plan)
     monkeypatch.undo()
 
@@ -179,7 +178,7 @@ def test_a_missing_recording_is_made_and_one_that_cannot_be_is_not_missed(
 def test_splits_are_added_to_a_run(tmp_path: Path):
     play(tmp_path, Plan("nothing", "synthetic", ("val",), 0))
     folder = play(tmp_path, Plan("nothing", "synthetic", ("open",), 0))
-    assert set(records.read_result(folder / "result.json")["splits"]) == {"val", "open"}
+    assert set(result_files.read_result(folder / "result.json")["splits"]) == {"val", "open"}
 
 
 def test_a_changed_split_is_played_again(tmp_path: Path):
@@ -193,8 +192,8 @@ def test_a_changed_split_is_played_again(tmp_path: Path):
     episodes = pd.read_parquet(folder / "episodes.parquet")
     assert episodes["offset_x"].tolist() == [0.03]
     assert (
-        records.read_result(folder / "result.json")["splits"]["open"]["digest"]
-        == splits.load("synthetic", "open").digest
+        result_files.read_result(folder / "result.json")["splits"]["open"]["digest"]
+        == load_split("synthetic", "open").digest
     )
 
 
@@ -257,14 +256,14 @@ def test_a_damaged_result_is_named(tmp_path: Path, text: str):
     place = tmp_path / "a" / "real" / "seed0" / "result.json"
     place.parent.mkdir(parents=True)
     place.write_text(json.dumps(RESULT))
-    assert list(records.results(tmp_path)) == [RESULT]
+    assert list(result_files.results(tmp_path)) == [RESULT]
     place.write_text(text)
     with pytest.raises(DamagedFile, match=r"result\.json is damaged"):
-        list(records.results(tmp_path))
+        list(result_files.results(tmp_path))
 
 
 def test_progress_is_told_in_order(tmp_path: Path):
     told = []
-    run.execute(Plan("nothing", "synthetic", ("test", "open"), 0), tmp_path, 1, lambda *parts: told.append(parts))
+    execution.execute(Plan("nothing", "synthetic", ("test", "open"), 0), tmp_path, 1, lambda *parts: told.append(parts))
     assert told == [(1, 2), (2, 2), (1, 1)]
     assert not [file for file in os.listdir(tmp_path / "nothing" / "synthetic" / "seed0") if file.endswith(".part")]

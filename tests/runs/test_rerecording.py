@@ -11,17 +11,14 @@ import pandas as pd
 import pytest
 from rerun.chunk import RrdReader
 
-from dextron_bench.runs import execution as run
-from dextron_bench.runs import rerecording as restoration
-from dextron_bench.runs import run_files as records
-from dextron_bench.runs import selection as gallery
-from dextron_bench.runs.execution import Plan
+from dextron_bench.runs import execution, rerecording, result_files, run_files, selection
+from dextron_bench.runs.plans import Plan
 from dextron_bench.runs.rerecording import Unplayable
-from dextron_bench.runs.selection import Wish
+from dextron_bench.runs.selection import EpisodeFilter
 from dextron_bench.storage import atomic
 from tests.helpers import tiny_benchmark
 
-ALL = Wish(worst=9)
+ALL = EpisodeFilter(worst=9)
 LATE = """
 import numpy as np
 
@@ -44,11 +41,11 @@ def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def play(folder: Path, record: int = 0, method: str = "exp") -> Path:
-    return run.execute(Plan(method, "synthetic", ("val", "test"), seed=2, record=record), folder, threads=1)
+    return execution.execute(Plan(method, "synthetic", ("val", "test"), seed=2, record=record), folder, threads=1)
 
 
-def restored(folder: Path, wish: Wish = ALL) -> list[Path]:
-    return restoration.restore(gallery.pick(gallery.episodes([folder]), wish)[0])
+def restored(folder: Path, wish: EpisodeFilter = ALL) -> list[Path]:
+    return rerecording.restore(selection.select(selection.episodes([folder]), wish)[0])
 
 
 def digests(files: list[Path]) -> dict[str, str]:
@@ -57,8 +54,8 @@ def digests(files: list[Path]) -> dict[str, str]:
 
 
 def change(folder: Path, **values: Any) -> None:
-    table = pd.read_parquet(folder / records.EPISODES)
-    records.store(folder, table.assign(**values))
+    table = pd.read_parquet(folder / run_files.EPISODES)
+    run_files.store(folder, table.assign(**values))
 
 
 def test_recordings_made_later_are_those_made_at_once(tmp_path: Path):
@@ -73,7 +70,7 @@ def test_recordings_made_later_are_those_made_at_once(tmp_path: Path):
 def test_what_is_recorded_is_not_made_again(tmp_path: Path):
     folder, told = play(tmp_path, record=1), []
     before = {file.name: file.read_bytes() for file in (folder / "recordings").iterdir()}
-    restoration.restore(gallery.pick(gallery.episodes([folder]), ALL)[0], lambda *parts: told.append(parts))
+    rerecording.restore(selection.select(selection.episodes([folder]), ALL)[0], lambda *parts: told.append(parts))
     assert told == [(1, 1)]
     assert {name: (folder / "recordings" / name).read_bytes() for name in before} == before
 
@@ -84,7 +81,7 @@ def test_a_damaged_recording_is_made_anew(tmp_path: Path, damage: Any):
     file = folder / "recordings" / "test-0001.rrd"
     expected = digests([file])
     file.write_bytes(damage(file.read_bytes()))
-    assert digests(restored(folder, Wish(split=("test",), row=(1,)))) == expected
+    assert digests(restored(folder, EpisodeFilter(split=("test",), row=(1,)))) == expected
 
 
 def test_a_recording_of_another_version_of_the_split_is_made_anew(tmp_path: Path):
@@ -92,24 +89,24 @@ def test_a_recording_of_another_version_of_the_split_is_made_anew(tmp_path: Path
     file = folder / "recordings" / "test-0000.rrd"
     expected = digests([file])
     (folder / "recordings" / "val-0000.rrd").replace(file)  # Of the same return.
-    assert digests(restored(folder, Wish(split=("test",), row=(0,)))) == expected
+    assert digests(restored(folder, EpisodeFilter(split=("test",), row=(0,)))) == expected
 
 
 def test_a_failed_agent_keeps_its_own_reason(tmp_path: Path):
     (tmp_path / "late.py").write_text(LATE)
     folder = play(tmp_path, method=f"{tmp_path / 'late.py'}:Late")
-    table = gallery.episodes([folder])
+    table = selection.episodes([folder])
     assert set(table["failure"]) == {"action 2 is outside [-1, 1] at step 7"}
-    (summary,) = restoration.recording.summarise(restored(folder, Wish(split=("val",))))
+    (summary,) = rerecording.recording.summarise(restored(folder, EpisodeFilter(split=("val",))))
     assert summary.properties["failure"] == "action 2 is outside [-1, 1] at step 7"
     assert (summary.properties["method"], summary.properties["seed"]) == ("late", 2)
 
 
 def test_without_actions_only_what_is_recorded_is_there(tmp_path: Path):
     folder = play(tmp_path, record=1)
-    table = pd.read_parquet(folder / records.EPISODES)
-    records.store(folder, table.drop(columns="actions"))
-    assert len(restored(folder, Wish(row=(0,)))) == 2
+    table = pd.read_parquet(folder / run_files.EPISODES)
+    run_files.store(folder, table.drop(columns="actions"))
+    assert len(restored(folder, EpisodeFilter(row=(0,)))) == 2
     with pytest.raises(Unplayable) as caught:
         restored(folder)
     assert str(caught.value).startswith(
@@ -117,8 +114,8 @@ def test_without_actions_only_what_is_recorded_is_there(tmp_path: Path):
     )
     (folder / "recordings" / "test-0000.rrd").write_bytes(b"")
     with pytest.raises(Unplayable, match="has a recording that is empty, and its actions were not kept"):
-        restored(folder, Wish(row=(0,)))
-    (folder / records.EPISODES).unlink()  # As the line said.
+        restored(folder, EpisodeFilter(row=(0,)))
+    (folder / run_files.EPISODES).unlink()  # As the line said.
     assert len(restored(play(tmp_path))) == 3
 
 
@@ -127,7 +124,7 @@ def test_an_episode_that_goes_otherwise_is_not_recorded(tmp_path: Path, column: 
     folder = play(tmp_path)
     change(folder, **{column: value})
     with pytest.raises(Unplayable, match=r"test row 0 of .* goes otherwise when it is played again: return .* not "):
-        restored(folder, Wish(split=("test",), row=(0,)))
+        restored(folder, EpisodeFilter(split=("test",), row=(0,)))
     assert not (folder / "recordings").exists()
 
 
@@ -136,7 +133,7 @@ def test_other_physics_and_another_version_of_the_split_are_told(tmp_path: Path)
     change(folder, digest="0" * 64)
     with pytest.raises(Unplayable, match="is of a version of the split that is no more"):
         restored(folder)
-    config = folder / records.CONFIG
+    config = folder / run_files.CONFIG
     config.write_text(json.dumps(json.loads(config.read_text()) | {"physics": "other"}))
     with pytest.raises(Unplayable, match="was played with other physics than this version's; remove"):
         restored(folder)
@@ -144,9 +141,9 @@ def test_other_physics_and_another_version_of_the_split_are_told(tmp_path: Path)
 
 def test_a_run_under_way_is_called_after_its_folder(tmp_path: Path):
     folder = play(tmp_path)
-    assert gallery.whose(folder) == {"method": "exp", "reaches": "synthetic", "seed": 2}
-    (folder / records.RESULT).unlink()
-    assert gallery.whose(folder) == {"method": "exp", "reaches": "synthetic", "seed": 2}
-    (folder / records.CONFIG).write_text("{}")
+    assert selection.run_identity(folder) == {"method": "exp", "reaches": "synthetic", "seed": 2}
+    (folder / result_files.RESULT).unlink()
+    assert selection.run_identity(folder) == {"method": "exp", "reaches": "synthetic", "seed": 2}
+    (folder / run_files.CONFIG).write_text("{}")
     with pytest.raises(atomic.DamagedFile, match="it lacks 'reaches'"):
-        gallery.whose(folder)
+        selection.run_identity(folder)

@@ -8,8 +8,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dextron_bench.runs import selection as gallery
-from dextron_bench.runs.selection import BadWish, NothingToView, Wish
+from dextron_bench.runs import selection
+from dextron_bench.runs.selection import BadFilter, EpisodeFilter, NoEpisodes
 
 COLUMNS = ["method", "reaches", "seed", "split", "row", "score", "length", "cause"]
 TABLE = pd.DataFrame(
@@ -45,7 +45,7 @@ TABLE = pd.DataFrame(
     ],
 )
 def test_a_wish_picks_these_episodes(wish: dict[str, Any], picked: list[int], matching: int):
-    found, count = gallery.pick(TABLE, Wish(**wish))
+    found, count = selection.select(TABLE, EpisodeFilter(**wish))
     assert (found.index.tolist(), count) == (picked, matching)
 
 
@@ -61,15 +61,15 @@ def test_a_wish_picks_these_episodes(wish: dict[str, Any], picked: list[int], ma
     ],
 )
 def test_what_no_episode_has_is_told_with_what_there_is(wish: dict[str, Any], told: str):
-    with pytest.raises(NothingToView) as caught:
-        gallery.pick(TABLE, Wish(**wish))
+    with pytest.raises(NoEpisodes) as caught:
+        selection.select(TABLE, EpisodeFilter(**wish))
     assert str(caught.value).startswith(told)
 
 
 @pytest.mark.parametrize("count", [0, -1])
 def test_fewer_than_one_episode_is_no_wish(count: int):
-    with pytest.raises(BadWish, match=f"--best {count}: pick 1 episode or more"):
-        Wish(best=count)
+    with pytest.raises(BadFilter, match=f"--best {count}: pick 1 episode or more"):
+        EpisodeFilter(best=count)
 
 
 def test_recordings_are_found_at_files_and_below_folders_each_once(tmp_path: Path):
@@ -77,9 +77,9 @@ def test_recordings_are_found_at_files_and_below_folders_each_once(tmp_path: Pat
     files[0].parent.mkdir(parents=True)
     for file in files:
         file.touch()
-    assert gallery.recordings([files[0], tmp_path]) == files
-    with pytest.raises(NothingToView, match=r"there is no .*empty"):
-        gallery.recordings([tmp_path / "empty"])
+    assert selection.recordings([files[0], tmp_path]) == files
+    with pytest.raises(NoEpisodes, match=r"there is no .*empty"):
+        selection.recordings([tmp_path / "empty"])
     (tmp_path / "empty" / "folder.rrd").mkdir(parents=True)
-    with pytest.raises(NothingToView, match=r"no recordings at .*empty"):
-        gallery.recordings([tmp_path, tmp_path / "empty"])
+    with pytest.raises(NoEpisodes, match=r"no recordings at .*empty"):
+        selection.recordings([tmp_path, tmp_path / "empty"])

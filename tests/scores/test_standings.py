@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench.scores import standings as leaderboard
-from dextron_bench.splits import loading as splits
+from dextron_bench.scores import standings
 from dextron_bench.splits import strata
+from dextron_bench.splits.loading import load_split
 
 
 def result(
@@ -18,31 +18,31 @@ def result(
 
 
 def test_a_row_is_the_mean_over_seeds_and_settings():
-    rows = leaderboard.table([result("bc", 0, [20, 0, 10, 20]), result("bc", 1, [20, 20, 0, 20], failed=1)])
+    rows = standings.table([result("bc", 0, [20, 0, 10, 20]), result("bc", 1, [20, 20, 0, 20], failed=1)])
     row = rows.iloc[0]
     assert (row["return"], row["success"], row["seeds"], row["episodes"], row["failed"]) == (13.75, 0.625, 2, 8, 1)
     assert row["return_low"] < 13.75 < row["return_high"]
 
 
 def test_best_first_and_versions_of_a_split_apart():
-    rows = leaderboard.table([result("a", 0, [0.0]), result("b", 0, [20.0]), result("a", 0, [5.0], digest="b" * 64)])
+    rows = standings.table([result("a", 0, [0.0]), result("b", 0, [20.0]), result("a", 0, [5.0], digest="b" * 64)])
     assert rows["method"].tolist() == ["b", "a", "a"]
     assert rows["version"].tolist() == ["aaaaaaaa", "bbbbbbbb", "aaaaaaaa"]
 
 
 def test_a_higher_score_that_is_not_20_is_no_success():
-    assert leaderboard.table([result("a", 0, [19.0, 20.0])]).iloc[0]["success"] == 0.5
+    assert standings.table([result("a", 0, [19.0, 20.0])]).iloc[0]["success"] == 0.5
 
 
 def test_endings_are_counted_over_seeds_and_lags_averaged_where_a_hand_closed():
     scores = [result("a", 0, [20.0, 3.0], lag=0.1), result("a", 1, [1.0, 2.0], lag=0.3), result("a", 2, [0.0, 0.0])]
-    row = leaderboard.table(scores).iloc[0]
+    row = standings.table(scores).iloc[0]
     assert (row["solved"], row["slipped"], row["too late"]) == (1, 5, 0)
     assert row["closing_lag"] == 0.2
 
 
 def test_no_results_make_an_empty_table():
-    assert leaderboard.table([]).empty
+    assert standings.table([]).empty
 
 
 def noisy(method: str, lead: float, seed: int = 0, reaches: str = "real", digest: str = "a" * 64) -> dict:
@@ -52,7 +52,7 @@ def noisy(method: str, lead: float, seed: int = 0, reaches: str = "real", digest
 
 
 def column(results: list[dict], name: str) -> dict:
-    return leaderboard.table(results).set_index("method")[name].to_dict()
+    return standings.table(results).set_index("method")[name].to_dict()
 
 
 def test_entrants_are_ranked_and_the_ceiling_is_not():
@@ -62,12 +62,12 @@ def test_entrants_are_ranked_and_the_ceiling_is_not():
 
 
 def test_nothing_is_ranked_in_the_world_that_sim_learns_in():
-    rows = leaderboard.table([noisy("sim", 4.0, reaches="minjerk"), noisy("nothing", 0.0, reaches="minjerk")])
+    rows = standings.table([noisy("sim", 4.0, reaches="minjerk"), noisy("nothing", 0.0, reaches="minjerk")])
     assert rows["rank"].isna().all()
 
 
 def test_ranks_are_by_source_split_and_version():
-    rows = leaderboard.table([noisy("a", 4.0), noisy("b", 0.0), noisy("b", 0.0, digest="b" * 64)])
+    rows = standings.table([noisy("a", 4.0), noisy("b", 0.0), noisy("b", 0.0, digest="b" * 64)])
     assert rows["rank"].tolist() == [1, 2, 1]
 
 
@@ -77,32 +77,32 @@ def test_regret_is_what_exp_scores_more():
 
 
 def test_without_exp_there_is_no_regret():
-    assert leaderboard.table([result("a", 0, [20.0])])["regret"].isna().all()
+    assert standings.table([result("a", 0, [20.0])])["regret"].isna().all()
 
 
 def test_one_more_entrant_changes_no_other_interval():
     alone = [noisy("a", 1.0, seed) for seed in range(3)]
-    rows = leaderboard.table([*(noisy("b", 5.0, seed) for seed in range(3)), *alone])
+    rows = standings.table([*(noisy("b", 5.0, seed) for seed in range(3)), *alone])
     assert rows["rank"].tolist() == [1, 2]
     pd.testing.assert_frame_equal(
         rows[rows["method"] == "a"].drop(columns="rank").reset_index(drop=True),
-        leaderboard.table(alone).drop(columns="rank"),
+        standings.table(alone).drop(columns="rank"),
     )
 
 
 def test_the_interquartile_mean_is_over_the_regions_of_a_split_that_ships():
     """The four regions nearest to -x score 20, nine score 0; three are cut off at either end."""
-    split = splits.load("real", "test")
+    split = load_split("real", "test")
     near = strata.strata(split)["angle"] == 0
     made = result("a", 0, np.where(near, 20.0, 0.0).tolist(), split.digest)
-    row = leaderboard.table([made]).iloc[0]
+    row = standings.table([made]).iloc[0]
     assert row["iqm"] == 20.0 / 7  # Of 13 regions the middle seven: one that scores 20.
-    assert np.isnan(leaderboard.table([result("a", 0, [20.0])]).iloc[0]["iqm"])
+    assert np.isnan(standings.table([result("a", 0, [20.0])]).iloc[0]["iqm"])
 
 
 def test_results_of_unequal_length_are_refused():
-    with pytest.raises(leaderboard.UnevenResults, match="test of real, version aaaaaaaa"):
-        leaderboard.table([result("a", 0, [1.0]), result("b", 0, [1.0, 2.0])])
+    with pytest.raises(standings.UnevenResults, match="test of real, version aaaaaaaa"):
+        standings.table([result("a", 0, [1.0]), result("b", 0, [1.0, 2.0])])
 
 
 def test_seeds_of_two_methods_are_drawn_apart():

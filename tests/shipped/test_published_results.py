@@ -9,16 +9,15 @@ from pathlib import Path
 import pytest
 
 import baselines
-from dextron_bench.cli import main as cli
-from dextron_bench.evaluation import rollout
-from dextron_bench.methods import registry as methods
-from dextron_bench.methods import weights
+from dextron_bench.cli import main
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.methods import registry, weights
 from dextron_bench.methods.learners import Learner
 from dextron_bench.reaches.setting import Source
-from dextron_bench.runs import run_files as records
-from dextron_bench.splits import loading as splits
+from dextron_bench.runs import result_files
+from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import atomic, tensors
-from dextron_bench.training import jobs as lessons
+from dextron_bench.training import jobs
 
 BOARD = Path(__file__).parents[2] / "leaderboard"
 RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))
@@ -27,15 +26,15 @@ WEIGHTS = sorted((Path(baselines.__file__).parent / "weights").glob("*/*/seed*.s
 
 def name(file: Path) -> str:
     """Method, source of reaches and seed of a file, as a folder of runs has them."""
-    return "/".join([*file.parts[-4:-1]] if file.name == records.RESULT else [*file.parts[-3:-1], file.stem])
+    return "/".join([*file.parts[-4:-1]] if file.name == result_files.RESULT else [*file.parts[-3:-1], file.stem])
 
 
 @pytest.mark.parametrize("file", RESULTS, ids=name)
 def test_a_result_is_whole_and_of_the_splits_that_ship(file: Path):
-    result = records.read_result(file)
+    result = result_files.read_result(file)
     assert name(file) == f"{result['method']}/{result['reaches']}/seed{result['seed']}"
-    for wanted in splits.evaluated(result["reaches"]):
-        split, found = splits.load(result["reaches"], wanted), result["splits"][wanted]
+    for wanted in ranking_splits(result["reaches"]):
+        split, found = load_split(result["reaches"], wanted), result["splits"][wanted]
         assert found["digest"] == split.digest
         assert len(found["scores"]) == sum(found["causes"].values()) == len(split.cases)
         assert found["causes"].get("solved", 0) == found["scores"].count(20.0)
@@ -46,7 +45,7 @@ def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
     again = tmp_path / "board"
     shutil.copytree(BOARD, again)
     (tmp_path / "recordings").symlink_to(BOARD.parent / "recordings")
-    assert cli.main(["leaderboard", "build", "--into", str(again)]) == 0
+    assert main.main(["leaderboard", "build", "--into", str(again)]) == 0
     for made in ("README.md", "table.csv", "table.json", "index.html"):
         assert (again / made).read_text() == (BOARD / made).read_text()
     assert {file.name for file in again.glob("*.png")} == {file.name for file in BOARD.glob("*.png")}
@@ -54,9 +53,9 @@ def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
 
 @pytest.mark.parametrize("file", WEIGHTS, ids=name)
 def test_weights_that_ship_are_those_of_the_result(file: Path):
-    result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
+    result = result_files.read_result(BOARD / "results" / name(file) / result_files.RESULT)
     assert result["training"].items() >= weights.about(file).items()
-    points = atomic.read_json(BOARD / "results" / name(file) / lessons.CURVE)["points"]
+    points = atomic.read_json(BOARD / "results" / name(file) / jobs.CURVE)["points"]
     assert result["training"]["best_epoch"] in [point["epoch"] for point in points]
 
 
@@ -70,10 +69,10 @@ def test_weights_that_ship_are_those_of_the_result(file: Path):
 def test_weights_that_ship_score_what_was_published(file: Path, rows: int, opened: Callable[[str], Source]):
     """Bit for bit, so the sums of rewards are equal; `dextron-bench eval` does the same for every row."""
     about, reaches = tensors.read_about(file), file.parent.name
-    learner = methods.create(about["method"], about["settings"])
+    learner = registry.create(about["method"], about["settings"])
     assert isinstance(learner, Learner)
-    split = splits.load(reaches, "test")
+    split = load_split(reaches, "test")
     agent, source = weights.agent(learner, file), opened(reaches)
-    found = {index: each.score for index, each in rollout.rollout(agent, source, split.cases[:rows])}
-    result = records.read_result(BOARD / "results" / name(file) / records.RESULT)
+    found = {index: each.score for index, each in rollout(agent, source, split.cases[:rows])}
+    result = result_files.read_result(BOARD / "results" / name(file) / result_files.RESULT)
     assert [found[row] for row in range(rows)] == result["splits"]["test"]["scores"][:rows]

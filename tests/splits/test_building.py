@@ -6,16 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.experts import policies as experts
+from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import MinjerkSource
-from dextron_bench.splits import building as partition
-from dextron_bench.splits import building_minjerk as partition_minjerk
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits import building, building_minjerk
 from dextron_bench.splits.building import Sizes, TooFewRows
+from dextron_bench.splits.loading import cases_from_frame, split_digest
 from dextron_bench.world.engine import Engine
 
 SIZES = Sizes(evaluated=20, val=10, open=5, subjects=2, reaches=0.25)
@@ -51,7 +50,7 @@ def database() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def parts(database) -> dict[str, pd.DataFrame]:
-    return partition.partition(Strata(), database, 0, SIZES, by_subject=True)
+    return building.partition(Strata(), database, 0, SIZES, by_subject=True)
 
 
 def subjects(rows: pd.DataFrame) -> set[str]:
@@ -71,28 +70,28 @@ def test_nothing_leaks(parts):
     assert not subjects(parts["unseen-subject"]) & subjects(home)
     seen = pd.concat([parts["train"], parts["val"], parts["test"]])
     assert not set(parts["unseen-reach"]["reach"]) & set(seen["reach"])
-    settings = [set(rows[partition.SETTING].itertuples(index=False, name=None)) for rows in parts.values()]
+    settings = [set(rows[building.SETTING].itertuples(index=False, name=None)) for rows in parts.values()]
     assert sum(len(each) for each in settings) == len(set.union(*settings))
 
 
 def test_train_keeps_every_expert_of_its_settings_and_the_others_one(parts):
-    assert (parts["train"].groupby(partition.SETTING).size() == 2).all()
-    assert (parts["test"].groupby(partition.SETTING).size() == 1).all()
+    assert (parts["train"].groupby(building.SETTING).size() == 2).all()
+    assert (parts["test"].groupby(building.SETTING).size() == 1).all()
 
 
 def test_equal_seeds_give_equal_parts(database, parts):
-    again = partition.partition(Strata(), database, 0, SIZES, by_subject=True)
+    again = building.partition(Strata(), database, 0, SIZES, by_subject=True)
     for name, rows in parts.items():
         pd.testing.assert_frame_equal(rows, again[name])
 
 
 def test_a_database_too_small_says_so(database):
     with pytest.raises(TooFewRows, match="needs 20 solved settings"):
-        partition.partition(Strata(), database.head(60), 0, SIZES, by_subject=False)
+        building.partition(Strata(), database.head(60), 0, SIZES, by_subject=False)
 
 
 def test_near_equal_settings_are_dropped():
-    held = pd.DataFrame([["a", 0.01, 0.02, 0.5]], columns=partition.SETTING)
+    held = pd.DataFrame([["a", 0.01, 0.02, 0.5]], columns=building.SETTING)
     rows = pd.DataFrame(
         [
             ["a", 0.0105, 0.0205, 0.51],  # Near in all three.
@@ -100,23 +99,23 @@ def test_near_equal_settings_are_dropped():
             ["a", 0.01, 0.02, 0.53],  # Another duration.
             ["b", 0.01, 0.02, 0.5],  # Another reach.
         ],
-        columns=partition.SETTING,
+        columns=building.SETTING,
     )
-    assert partition.without_near(rows, held).index.tolist() == [1, 2, 3]
+    assert building.without_near(rows, held).index.tolist() == [1, 2, 3]
 
 
 def test_window_and_best_of_a_scan():
     scores = np.array([[0, 20, 20, 20, 0, 20, 0, 0], [0, 0, 3, 0, 0, 0, 0, 0], np.zeros(8)], float)
-    np.testing.assert_allclose(partition.window(scores), [0.89 * 4 / 8, 0.0, 0.0])
+    np.testing.assert_allclose(building.window(scores), [0.89 * 4 / 8, 0.0, 0.0])
     # The middles of bands 2 and 2; with nothing anywhere, of the whole range (band 3).
-    np.testing.assert_allclose(partition.best(scores), 0.01 + 0.89 * np.array([2.5, 2.5, 3.5]) / 8)
+    np.testing.assert_allclose(building.best(scores), 0.01 + 0.89 * np.array([2.5, 2.5, 3.5]) / 8)
 
 
 def test_a_scan_plays_each_row_with_its_own_gain():
     source = MinjerkSource()
     rows = setting.to_frame([source.sample(np.random.default_rng(0))] * 2).assign(gain=[2.0, 1.0])
-    scores = partition.scan(source, rows, Engine(6, 1), points=3)
-    swapped = partition.scan(source, rows.iloc[::-1], Engine(6, 1), points=3)
+    scores = building.scan(source, rows, Engine(6, 1), points=3)
+    swapped = building.scan(source, rows.iloc[::-1], Engine(6, 1), points=3)
     np.testing.assert_array_equal(scores, swapped[::-1])
     assert scores[0, 0] > 1  # Closes at d_c = 0.158, as the paper's expert of this world.
     assert scores[0, 2] == 0  # Closes at 0.752, long before it comes to the bottle.
@@ -124,12 +123,12 @@ def test_a_scan_plays_each_row_with_its_own_gain():
 
 # `minjerk`, where there is one expert and no offset.
 
-FEW = partition_minjerk.Sizes(train=2, val=1, test=2, scan=2, batch=3)
+FEW = building_minjerk.Sizes(train=2, val=1, test=2, scan=2, batch=3)
 
 
 @pytest.fixture(scope="module")
 def minjerk() -> dict[str, pd.DataFrame]:
-    return partition_minjerk.draw(MinjerkSource(), Engine(8, 1), 0, FEW)
+    return building_minjerk.draw(MinjerkSource(), Engine(8, 1), 0, FEW)
 
 
 def test_minjerk_trains_on_listed_reaches_and_holds_out_further_ones(minjerk):
@@ -143,7 +142,7 @@ def test_minjerk_trains_on_listed_reaches_and_holds_out_further_ones(minjerk):
 def test_minjerk_rows_are_solved_by_its_one_expert_in_a_drawn_order(minjerk):
     source, rows = MinjerkSource(), pd.concat(minjerk.values())
     assert set(zip(rows["gain"], rows["critical"], strict=True)) == {(2.0, 0.15)}
-    played = dict(rollout(ExpertAgent(), source, splits.cases(rows.assign(window=0.0)), threads=1))
+    played = dict(rollout(ExpertAgent(), source, cases_from_frame(rows.assign(window=0.0)), threads=1))
     assert [episode.score for episode in played.values()] == [20.0] * 5
     drawn = np.random.default_rng([0, 0, 3]).permutation(1000)
     order = [f"minjerk-{number:06d}" for number in drawn]
@@ -153,23 +152,23 @@ def test_minjerk_rows_are_solved_by_its_one_expert_in_a_drawn_order(minjerk):
 
 
 def test_unsolved_minjerk_reaches_are_passed_over(monkeypatch):
-    monkeypatch.setattr(partition_minjerk, "EXPERT", experts.Expert(2.0, 0.9))  # Hits the bottle with a closed hand.
+    monkeypatch.setattr(building_minjerk, "EXPERT", policies.Expert(2.0, 0.9))  # Hits the bottle with a closed hand.
     with pytest.raises(TooFewRows, match="1 solved minjerk reaches are asked for and there are 0"):
-        partition_minjerk.solved(MinjerkSource(), np.arange(4), 1, Engine(4, 1), batch=2)
+        building_minjerk.solved(MinjerkSource(), np.arange(4), 1, Engine(4, 1), batch=2)
 
 
 def test_minjerk_is_written_beside_the_other_sources(tmp_path):
     (tmp_path / "splits.json").write_text('{"real": {}}')
-    entry = partition_minjerk.build(tmp_path, Engine(8, 1), 0, FEW)
+    entry = building_minjerk.build(tmp_path, Engine(8, 1), 0, FEW)
     assert json.loads((tmp_path / "splits.json").read_text()) == {"real": {}, "minjerk": entry}
     table = pd.read_parquet(tmp_path / "splits-minjerk.parquet")
-    assert table.columns.tolist() == partition.COLUMNS
+    assert table.columns.tolist() == building.COLUMNS
     assert table["split"].tolist() == ["train"] * 2 + ["val"] + ["test"] * 2
     assert set(table["window"]) <= {0.0, 0.445, 0.89}
-    assert entry["val"]["digest"] == splits.digest(table[table["split"] == "val"])
+    assert entry["val"]["digest"] == split_digest(table[table["split"] == "val"])
 
 
 def test_only_minjerk_does_without_a_database(tmp_path, capsys):
-    assert cli.main(["splits", "--reaches", "synthetic", "--into", str(tmp_path)]) == 2
+    assert main.main(["splits", "--reaches", "synthetic", "--into", str(tmp_path)]) == 2
     assert "splits of synthetic reaches need --database" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -10,18 +10,25 @@ import pandas as pd
 import pytest
 
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.experts import policies as experts
+from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.setting import OFFSET, Source
 from dextron_bench.reaches.sources import open_source
-from dextron_bench.splits import building as partition
-from dextron_bench.splits import building_minjerk as partition_minjerk
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits import building, building_minjerk
 from dextron_bench.splits.building import SETTING
-from dextron_bench.splits.loading import DamagedSplit, UnknownSplit
+from dextron_bench.splits.loading import (
+    DamagedSplit,
+    Split,
+    UnknownSplit,
+    all_splits,
+    known_splits,
+    load_split,
+    ranking_splits,
+    split_digest,
+)
 from tests.helpers import tiny_benchmark
 
-SHIPPED = splits.everything()
+SHIPPED = all_splits()
 SOURCES = sorted({reaches for reaches, _ in SHIPPED})
 each_split = pytest.mark.parametrize(("reaches", "name"), SHIPPED)
 each_source = pytest.mark.parametrize("reaches", SOURCES)
@@ -47,7 +54,7 @@ def replace(folder: Path, rows: pd.DataFrame) -> None:
 
 def complaint() -> str:
     with pytest.raises(DamagedSplit) as caught:
-        splits.load("synthetic", "test")
+        load_split("synthetic", "test")
     assert "\n" not in str(caught.value)
     assert "'synthetic'" in str(caught.value)
     assert "reinstall the package" in str(caught.value)
@@ -55,28 +62,28 @@ def complaint() -> str:
 
 
 def test_a_split_is_its_rows_in_order(folder: Path):
-    split = splits.load("synthetic", "test")
+    split = load_split("synthetic", "test")
     assert [case.setting.reach for case in split.cases] == ["a", "b"]
-    assert split.cases[0].expert == experts.Expert(1.4684286438473184, 0.2672967412483991)
+    assert split.cases[0].expert == policies.Expert(1.4684286438473184, 0.2672967412483991)
     assert split.cases[0].window == 0.1
-    assert split.digest == splits.digest(tiny_benchmark.ROWS[tiny_benchmark.ROWS["split"] == "test"])
+    assert split.digest == split_digest(tiny_benchmark.ROWS[tiny_benchmark.ROWS["split"] == "test"])
 
 
 def test_names_come_in_one_order_and_only_three_rank(folder: Path):
-    assert splits.known("synthetic") == ("val", "test", "unseen-reach", "open")
-    assert splits.evaluated("synthetic") == ("test", "unseen-reach")
-    assert splits.everything() == [("synthetic", name) for name in splits.known("synthetic")]
+    assert known_splits("synthetic") == ("val", "test", "unseen-reach", "open")
+    assert ranking_splits("synthetic") == ("test", "unseen-reach")
+    assert all_splits() == [("synthetic", name) for name in known_splits("synthetic")]
 
 
 def test_an_unknown_name_lists_the_others(folder: Path):
     with pytest.raises(UnknownSplit) as caught:
-        splits.load("synthetic", "tset")
+        load_split("synthetic", "tset")
     assert str(caught.value) == ("no split 'tset' of 'synthetic' reaches; choose from val, test, unseen-reach, open")
 
 
 def test_a_source_without_splits_says_so(folder: Path):
     with pytest.raises(UnknownSplit, match="of 'real' reaches; none ships"):
-        splits.evaluated("real")
+        ranking_splits("real")
 
 
 @pytest.mark.parametrize("column", tiny_benchmark.COLUMNS[1:])
@@ -87,7 +94,7 @@ def test_any_changed_number_or_name_is_damage(folder: Path, column: str):
     rows[column] = values
     replace(folder, rows)
     assert "split 'test'" in complaint()
-    assert len(splits.load("synthetic", "val").cases) == 1  # The other splits are whole.
+    assert len(load_split("synthetic", "val").cases) == 1  # The other splits are whole.
 
 
 def test_a_missing_an_added_and_a_moved_row_are_damage(folder: Path):
@@ -116,19 +123,19 @@ def test_a_cut_and_a_missing_file_are_damage(folder: Path):
 def test_a_damaged_catalogue_is_one_line(folder: Path, text: str):
     (folder / "splits.json").write_text(text)
     with pytest.raises(DamagedSplit, match="catalogue of splits cannot be read"):
-        splits.known("synthetic")
+        known_splits("synthetic")
 
 
 # What ships.
 
 
 @pytest.fixture(scope="module")
-def shipped() -> dict[tuple[str, str], splits.Split]:
+def shipped() -> dict[tuple[str, str], Split]:
     tiny_benchmark.forget()
-    return {names: splits.load(*names) for names in SHIPPED}
+    return {names: load_split(*names) for names in SHIPPED}
 
 
-def settings(split: splits.Split) -> pd.DataFrame:
+def settings(split: Split) -> pd.DataFrame:
     """The settings of a split, one a row, with the columns SETTING."""
     found = [(s.reach, s.offset_x, s.offset_y, s.duration_noise) for s in (case.setting for case in split.cases)]
     return pd.DataFrame(found, columns=SETTING)
@@ -144,7 +151,7 @@ def test_numbers_lie_where_the_paper_draws_them(shipped: dict, reaches: str, nam
     assert np.isfinite(numbers).all()
     assert (np.abs(numbers[:, :2]) <= OFFSET).all()
     assert (np.abs(numbers[:, 2]) < 6.0).all()  # Standard normal.
-    low, high = GAINS.get(reaches, experts.GAIN)
+    low, high = GAINS.get(reaches, policies.GAIN)
     assert ((gains >= low) & (gains <= high)).all()
     assert ((criticals >= 0.01) & (criticals <= 0.9)).all()
     assert ((windows >= 0.0) & (windows <= 0.89)).all()
@@ -173,13 +180,13 @@ def test_evaluated_rows_are_all_different(shipped: dict, reaches: str, name: str
 @each_source
 def test_no_setting_of_one_split_is_near_one_of_another(shipped: dict, reaches: str):
     train = settings(shipped[reaches, "train"])
-    for name in splits.known(reaches):
+    for name in known_splits(reaches):
         if name != "train":
-            left = partition.without_near(train, settings(shipped[reaches, name]))
+            left = building.without_near(train, settings(shipped[reaches, name]))
             assert len(left) == len(train), f"{name} is near train"
-    for name in splits.evaluated(reaches):
+    for name in ranking_splits(reaches):
         val = settings(shipped[reaches, "val"])
-        assert len(partition.without_near(val, settings(shipped[reaches, name]))) == len(val), f"{name} is near val"
+        assert len(building.without_near(val, settings(shipped[reaches, name]))) == len(val), f"{name} is near val"
 
 
 @each_source
@@ -201,13 +208,13 @@ def test_held_out_reaches_and_subjects_occur_nowhere_else(shipped: dict, reaches
 def test_minjerk_has_each_reach_once_and_trains_on_the_listed_ones(shipped: dict):
     if "minjerk" not in SOURCES:
         pytest.skip("no splits of minjerk ship")
-    assert splits.known("minjerk") == ("train", "val", "test")
-    assert splits.evaluated("minjerk") == ("test",)
-    reaches = {name: settings(shipped["minjerk", name])["reach"] for name in splits.known("minjerk")}
+    assert known_splits("minjerk") == ("train", "val", "test")
+    assert ranking_splits("minjerk") == ("test",)
+    reaches = {name: settings(shipped["minjerk", name])["reach"] for name in known_splits("minjerk")}
     assert not pd.concat(reaches.values()).duplicated().any()
     listed = open_source("minjerk").names
     assert {name: each.isin(listed).mean() for name, each in reaches.items()} == {"train": 1.0, "val": 0.0, "test": 0.0}
-    assert {case.expert for name in reaches for case in shipped["minjerk", name].cases} == {partition_minjerk.EXPERT}
+    assert {case.expert for name in reaches for case in shipped["minjerk", name].cases} == {building_minjerk.EXPERT}
 
 
 @each_split

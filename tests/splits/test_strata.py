@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 
 from dextron_bench.reaches.setting import Source
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import all_splits, load_split
 from dextron_bench.splits.strata import REGION, SUBJECT, by_stratum, regions, strata
 
 
-@pytest.mark.parametrize(("reaches", "split"), [(r, s) for r, s in splits.everything() if s == "test"])
+@pytest.mark.parametrize(("reaches", "split"), [(r, s) for r, s in all_splits() if s == "test"])
 def test_strata_are_those_that_the_source_tells(reaches: str, split: str, opened: Callable[[str], Source]):
-    loaded, source = splits.load(reaches, split), opened(reaches)
+    loaded, source = load_split(reaches, split), opened(reaches)
     told = [source.stratum(case.setting.reach) for case in loaded.cases]
     expected = [(each.subject, each.ring, each.angle) for each in told]
     assert list(strata(loaded).itertuples(index=False, name=None)) == expected
@@ -23,7 +23,7 @@ def test_strata_are_those_that_the_source_tells(reaches: str, split: str, opened
 
 def test_a_recorded_reach_says_by_its_name_whose_it_is():
     """Marker 11 is the third on the third ring of four."""
-    split = splits.load("real", "test")
+    split = load_split("real", "test")
     row = next(i for i, case in enumerate(split.cases) if case.setting.reach.endswith("_11"))
     found = strata(split).iloc[row]
     assert (found["subject"], found["ring"], found["angle"]) == (split.cases[row].setting.reach[:2], 2, 2)
@@ -45,7 +45,7 @@ def test_groups_have_means_over_seeds_and_rows():
 
 
 def test_regions_are_numbered_by_ring_then_angle():
-    split = splits.load("real", "test")
+    split = load_split("real", "test")
     found = strata(split)
     numbers = regions("real", "test", split.digest)
     assert numbers is not None

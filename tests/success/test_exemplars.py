@@ -9,22 +9,22 @@ import pytest
 
 from dextron_bench.evaluation.diagnosis import Diagnosis
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.scores import figures
-from dextron_bench.success.exemplars import KINDS, Foresight, choose
+from dextron_bench.success.exemplars import KINDS, PredictedEpisode, choose
 from dextron_bench.success.network import GRID
 
 
-def seen(player: str, cause: str, best: list[float], own: list[float]) -> Foresight:
+def seen(player: str, cause: str, best: list[float], own: list[float]) -> PredictedEpisode:
     """An episode of as many steps, in each of which the best action and the chosen one, 0, have these chances."""
     steps = len(own)
     curves = np.tile(np.array(own)[:, None], 51)
     curves[:, -1] = best
     rewards = np.full(steps, 20.0 / steps if cause == "solved" else 0.0)
     episode = Episode(Setting("a", 0, 0, 0), np.zeros((steps + 1, 48)), np.zeros((steps, 1)), rewards, False, True)
-    insight = Insight(GRID, curves, np.array(own), np.zeros(steps), duration=steps)
-    return Foresight(player, episode, Diagnosis(cause, 0.0), insight)
+    insight = StepPredictions(GRID, curves, np.array(own), np.zeros(steps), duration=steps)
+    return PredictedEpisode(player, episode, Diagnosis(cause, 0.0), insight)
 
 
 EXPERT = seen("expert", "solved", [0.9, 0.9], [0.8, 0.9])

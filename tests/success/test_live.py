@@ -14,7 +14,7 @@ from rerun.chunk import RrdReader
 
 from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.predictions import Insight
+from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.recording import viewer
@@ -32,13 +32,13 @@ class Notebook:
     """An audience that keeps what it was shown."""
 
     def __init__(self) -> None:
-        self.shown: list[tuple[np.ndarray, np.ndarray, Insight]] = []
+        self.shown: list[tuple[np.ndarray, np.ndarray, StepPredictions]] = []
         self.outcome: bool | None = None
 
-    def show(self, states: np.ndarray, actions: np.ndarray, insight: Insight) -> None:
+    def show(self, states: np.ndarray, actions: np.ndarray, insight: StepPredictions) -> None:
         self.shown.append((states, actions, insight))
 
-    def close(self, actions: np.ndarray, insight: Insight, success: bool) -> None:
+    def close(self, actions: np.ndarray, insight: StepPredictions, success: bool) -> None:
         self.outcome = success
 
 
@@ -69,16 +69,16 @@ def test_a_viewer_that_is_gone_is_told_before_more_is_played(monkeypatch: pytest
 
     monkeypatch.setattr(viewer, "process", process)
     monkeypatch.setattr(viewer, "address", lambda port, opened: "nowhere")
-    with recording.theatre() as (connect, wait):
+    with recording.open_live_viewer() as (connect, wait):
         with pytest.raises(recording.ViewerError, match=r"gone .code 3.; nothing more is played"):
-            recording.Stage(connect, "live", SOURCE.path(CASE.setting), {})
+            recording.LiveView(connect, "live", SOURCE.path(CASE.setting), {})
         with pytest.raises(recording.ViewerError, match="ended with code 3"):
             wait()
 
 
 def test_a_stage_draws_all_of_it(tmp_path: Path):
     file, episode = tmp_path / "live.rrd", alone()
-    stage = recording.Stage(lambda stream: stream.save(file), "live", SOURCE.path(CASE.setting), {"method": "exp"})
+    stage = recording.LiveView(lambda stream: stream.save(file), "live", SOURCE.path(CASE.setting), {"method": "exp"})
     live.play(ExpertAgent(), SOURCE, CASE, MODEL, stage, speed=0)
     chunks = [chunk for chunk in RrdReader(file).store().stream().to_chunks() if not chunk.is_static]
     entities = {str(chunk.entity_path) for chunk in chunks}

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from baselines.floors import Nothing
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.storage import folder_config, tensors
-from dextron_bench.success import metrics as judgement
+from dextron_bench.success import metrics
 from dextron_bench.success.dataset import BadDataset, Dataset, EmptyDataset
 from dextron_bench.success.generation import POLICY, SOLVED, UNIFORM, BadCollection, Collection, Tally, collect, draw
 from dextron_bench.success.generation import file_of as block_file
@@ -266,12 +266,12 @@ def test_training_learns_what_can_be_learned(tmp_path: Path):
     assert tensors.read_about(tmp_path / MODEL)["curve"][0]["test_accuracy"] > 0.9
 
 
-# Judgement
+# Metrics
 
 
 def test_judgement_by_hand():
     chances, outcomes = np.array([0.9, 0.6, 0.6, 0.1]), np.array([1, 1, 0, 0])
-    found = judgement.judge(chances, outcomes)
+    found = metrics.evaluate(chances, outcomes)
     assert (found.rows, found.base_rate, found.accuracy, found.base_accuracy) == (4, 0.5, 0.75, 0.5)
     assert found.brier == pytest.approx((0.01 + 0.16 + 0.36 + 0.01) / 4)
     assert found.base_brier == 0.25
@@ -280,7 +280,7 @@ def test_judgement_by_hand():
 
 
 def test_one_kind_of_outcome_has_no_auc():
-    assert np.isnan(judgement.auc(np.array([0.2, 0.3]), np.array([1, 1])))
+    assert np.isnan(metrics.auc(np.array([0.2, 0.3]), np.array([1, 1])))
 
 
 @given(st.lists(st.tuples(st.floats(0, 1), st.integers(0, 1)), min_size=2, max_size=30))
@@ -289,6 +289,6 @@ def test_auc_is_the_share_of_pairs_in_order(pairs: list[tuple[float, int]]):
     wins, losses = chances[outcomes == 1], chances[outcomes == 0]
     if len(wins) and len(losses):
         gaps = wins[:, None] - losses[None, :]
-        assert judgement.auc(chances, outcomes) == pytest.approx(((gaps > 0) + 0.5 * (gaps == 0)).mean())
-    _, _, counts = judgement.calibration(chances, outcomes)
+        assert metrics.auc(chances, outcomes) == pytest.approx(((gaps > 0) + 0.5 * (gaps == 0)).mean())
+    _, _, counts = metrics.calibration(chances, outcomes)
     assert counts.sum() == len(pairs)

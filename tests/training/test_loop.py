@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dextron_bench.evaluation.rollout import AgentError
-from dextron_bench.methods.learners import Heir, Learner, Track
-from dextron_bench.splits import loading as splits
+from dextron_bench.methods.agents import AgentError
+from dextron_bench.methods.learners import Learner, PolicyTransfer, Track
+from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import atomic, provenance, tensors
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
-from dextron_bench.training import learning_curve as curve
-from dextron_bench.training import loop as training
+from dextron_bench.training import learning_curve, loop, timing
 from dextron_bench.training.checkpoints import Busy, Checkpoints
 from dextron_bench.training.loop import Diverged
 from tests.helpers import tiny_benchmark, tiny_training
@@ -44,21 +43,21 @@ def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Tiny splits, scores that cost nothing, and a provenance that no one's commit changes meanwhile."""
     tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.setattr(provenance, "collect", lambda physics: {"git": "abc"})
-    monkeypatch.setattr(curve, "rollout", score)
+    monkeypatch.setattr(learning_curve, "rollout", score)
     monkeypatch.setattr(os, "fsync", lambda descriptor: None)
     yield
     tiny_benchmark.forget()
 
 
 def train(folder: Path, learner: Any = QUICK, device: str = "cpu", **options: Any) -> Checkpoints:
-    cases = splits.load("synthetic", "train").cases
+    cases = load_split("synthetic", "train").cases
     track = Track(tiny_benchmark.SOURCE, cases, folder / "cache", threads=1, device=device)
-    return training.train(learner, track, SEEDS, folder, splits.load("synthetic", "val"), **options)
+    return loop.train(learner, track, SEEDS, folder, load_split("synthetic", "val"), **options)
 
 
 def test_toys_are_what_the_contract_asks_for():
     assert isinstance(QUICK, Learner)
-    assert not isinstance(QUICK, Heir)
+    assert not isinstance(QUICK, PolicyTransfer)
 
 
 def test_a_training_leaves_checkpoint_metrics_and_snapshots(tmp_path: Path):
@@ -82,7 +81,7 @@ def test_again_it_computes_nothing_and_changes_no_byte(tmp_path: Path, monkeypat
     before = tiny_training.contents(tmp_path / "a")
     for name in ("__init__", "advance"):
         monkeypatch.setattr(ToyTrainer, name, None)
-    monkeypatch.setattr(curve, "rollout", None)
+    monkeypatch.setattr(learning_curve, "rollout", None)
     train(tmp_path / "a")
     assert tiny_training.contents(tmp_path / "a") == before
 
@@ -140,11 +139,11 @@ def test_a_training_depends_on_journal_and_streams(tmp_path: Path, monkeypatch: 
 
 
 def test_of_equal_snapshots_the_later_is_the_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(curve, "FINALISTS", 2)
-    monkeypatch.setattr(curve, "CURVE", 1)
-    monkeypatch.setattr(splits, "load", lambda *_, load=splits.load: load("synthetic", "test"))
+    monkeypatch.setattr(learning_curve, "FINALISTS", 2)
+    monkeypatch.setattr(learning_curve, "CURVE", 1)
+    monkeypatch.setitem(globals(), "load_split", lambda *_, load=load_split: load("synthetic", "test"))
     done = train(tmp_path / "a", Toy(every=1, preset="quick"))
-    made = curve.Curve(QUICK, done, tiny_benchmark.SOURCE, splits.load("synthetic", "val"))
+    made = learning_curve.Curve(QUICK, done, tiny_benchmark.SOURCE, load_split("synthetic", "val"))
     points = {1: 9.0, 2: 4.0, 3: 9.0, 4: 9.0, 5: 8.0}  # Of the first row.
     finals = {1: [20.0, 20.0], 3: [9.0, 5.0], 4: [9.0, 5.0]}
     for epoch in points:
@@ -158,7 +157,7 @@ def test_of_equal_snapshots_the_later_is_the_best(tmp_path: Path, monkeypatch: p
 
 def write_scores(done: Checkpoints, epoch: int, rows: int, scores: list[float]) -> None:
     file = done.snapshot(epoch, 0).with_name(f"seed0-val{rows}.json")
-    atomic.write_json(file, {"digest": splits.load("synthetic", "val").digest, "scores": scores})
+    atomic.write_json(file, {"digest": load_split("synthetic", "val").digest, "scores": scores})
 
 
 def test_scores_on_another_version_of_val_do_not_count(tmp_path: Path):
@@ -235,8 +234,8 @@ def test_two_processes_do_not_train_in_one_folder(tmp_path: Path):
 
 
 def test_time_left_is_that_of_the_middle_epoch_and_evaluation(tmp_path: Path):
-    assert training.seconds_left(tmp_path, 10, 2) is None
+    assert timing.seconds_left(tmp_path, 10, 2) is None
     rows = [("epoch", 2.0), ("epoch", 3.0), ("epoch", 100.0), ("evaluation", 1.0)]
     lines = [json.dumps({"what": what, "seconds": seconds}) for what, seconds in rows]
     (tmp_path / "timing.jsonl").write_text("\n".join([*lines, '{"what": "ep']))
-    assert training.seconds_left(tmp_path, 11, 2) == 11 * 3.0 + 6 * 1.0
+    assert timing.seconds_left(tmp_path, 11, 2) == 11 * 3.0 + 6 * 1.0

@@ -12,12 +12,12 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench.leaderboard.page import sections, showreel
-from dextron_bench.leaderboard.page import standings_table as standings
+from dextron_bench.leaderboard import highlights
+from dextron_bench.leaderboard.page import sections, standings_table
 from dextron_bench.leaderboard.page.html import Html, join, tag
 from dextron_bench.leaderboard.page.rows import Entry, entries
 from dextron_bench.leaderboard.page.sections import Curves, options
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import SPLIT_NAMES
 
 FILE = "index.html"
 FIRST = "real", "test"  # What is shown first, where there is a script.
@@ -28,7 +28,7 @@ def document(rows: pd.DataFrame, results: Iterable[dict[str, Any]], curves: Curv
 
     It asks for nothing: no network, no other file, and no script but its own may run. Raises BrokenRecording.
     """
-    results, shown = list(results), showreel.chosen(recordings)
+    results, shown = list(results), highlights.chosen(recordings)
     found, script = entries(rows, results), _part("page.js")
     parts = {
         "Learning curves": sections.curves(curves, rows),
@@ -43,7 +43,7 @@ def document(rows: pd.DataFrame, results: Iterable[dict[str, Any]], curves: Curv
         "script": script,
         "facts": _facts(rows),
         "controls": _controls(found),
-        "table": standings.table(found, showreel.by_method(shown)),
+        "table": standings_table.table(found, highlights.by_method(shown)),
         "sections": join(*(_section(title, list(content)) for title, content in parts.items())),
     }
     return Template(_part("page.html")).substitute(filled)
@@ -52,7 +52,7 @@ def document(rows: pd.DataFrame, results: Iterable[dict[str, Any]], curves: Curv
 def _controls(found: Sequence[Entry]) -> Html:
     """What chooses rows: source, split and tier."""
     sources = sorted({each.reaches for each in found})
-    names = [name for name in splits.NAMES if name in {each.split for each in found}]
+    names = [name for name in SPLIT_NAMES if name in {each.split for each in found}]
     tiers = sorted({each.tier for each in found})
     first = [value if value in known else None for value, known in zip(FIRST, (sources, names), strict=True)]
     choices = zip(("reaches", "split", "tier"), (sources, names, tiers), (*first, None), strict=True)

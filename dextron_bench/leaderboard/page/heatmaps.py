@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench.leaderboard.page.html import UNKNOWN, Html, tag
-from dextron_bench.splits import loading as splits
 from dextron_bench.splits import strata
+from dextron_bench.splits.loading import EVALUATED, known_splits, load_split
 from dextron_bench.world import task
 
 RINGS, ANGLES = range(4), range(4)
@@ -51,16 +51,16 @@ def maps(table: pd.DataFrame, methods: Sequence[str], name: str) -> Iterator[Htm
 
 
 def _same(reaches: str, name: str, found: dict[str, Any]) -> bool:
-    return name in splits.EVALUATED and name in splits.known(reaches) and _digest(reaches, name) == found["digest"]
+    return name in EVALUATED and name in known_splits(reaches) and _digest(reaches, name) == found["digest"]
 
 
 def _digest(reaches: str, name: str) -> str:
-    return splits.load(reaches, name).digest
+    return load_split(reaches, name).digest
 
 
 def _beside(key: tuple[str, str], methods: dict[str, list[np.ndarray]]) -> pd.DataFrame:
     rates = pd.DataFrame({method: np.mean(seeds, axis=0) for method, seeds in methods.items()})
-    return pd.concat([strata.strata(splits.load(*key)), rates], axis=1)
+    return pd.concat([strata.strata(load_split(*key)), rates], axis=1)
 
 
 def _map(

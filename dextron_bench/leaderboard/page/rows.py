@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench.methods import registry as methods
+from dextron_bench.methods import registry
 
 TIERS = ("self-reported", "replayed", "re-run")  # The least checked first.
 QUOTED = "quoted"
@@ -71,9 +71,9 @@ def tier(results: Sequence[Result]) -> str:
 
 def role(method: str) -> str | None:
     """What a method is that is no entrant."""
-    if method in methods.CEILINGS:
+    if method in registry.CEILINGS:
         return "ceiling"
-    return "floor" if method in methods.FLOORS else None
+    return "floor" if method in registry.FLOORS else None
 
 
 def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
@@ -138,4 +138,4 @@ def _privileged(method: str, results: Sequence[Result]) -> str | None:
     """What an agent was given beside the state, as was declared."""
     told = [str(result["privileged"]) for result in results if result.get("privileged")]
     told += ["more than the state, as declared" for each in results if (each.get("declared") or {}).get("privileged")]
-    return told[0] if told else ("each setting's expert" if method in methods.CEILINGS else None)
+    return told[0] if told else ("each setting's expert" if method in registry.CEILINGS else None)

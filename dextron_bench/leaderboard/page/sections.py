@@ -9,12 +9,12 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
-from dextron_bench.leaderboard.page import heatmaps as regions
-from dextron_bench.leaderboard.page import showreel
-from dextron_bench.leaderboard.page import svg as drawing
+from dextron_bench.leaderboard import highlights
+from dextron_bench.leaderboard.highlights import Shown
+from dextron_bench.leaderboard.page import heatmaps
+from dextron_bench.leaderboard.page import svg as page_svg
 from dextron_bench.leaderboard.page.html import UNKNOWN, Html, join, tag
-from dextron_bench.leaderboard.page.showreel import Shown
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import EVALUATED
 from dextron_bench.success.exemplars import KINDS
 
 Curves = Mapping[str, Mapping[str, Mapping[int, pd.DataFrame]]]  # By source of reaches, method and seed.
@@ -30,7 +30,7 @@ def curves(found: Curves, rows: pd.DataFrame) -> Iterator[Html]:
         svg = figures.inline(lambda file, methods=methods, here=here: figures.learning_curves(methods, here, file))
         label = f"Learning curves on {reaches} reaches: return on val against epochs, of {', '.join(sorted(own))}"
         caption = tag("figcaption", f"{reaches} reaches")
-        picture = _scroll(drawing.picture(svg, f"curves-{reaches}", label), f"Learning curves on {reaches} reaches")
+        picture = _scroll(page_svg.picture(svg, f"curves-{reaches}", label), f"Learning curves on {reaches} reaches")
         yield tag("figure", picture, caption, data_reaches=reaches)
 
 
@@ -48,12 +48,12 @@ def endings(rows: pd.DataFrame) -> Iterator[Html]:
 
 def heat(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> Iterator[Html]:
     """Success by subject and start region, methods best first."""
-    found = regions.successes(results)
+    found = heatmaps.successes(results)
     for reaches, split, group in _parts(rows):
         if (reaches, split) in found:
             table, name = found[reaches, split], f"{split} of {reaches} reaches"
             methods = [method for method in dict.fromkeys(group["method"]) if method in table]
-            maps = [_scroll(each, f"Success, {name}") for each in regions.maps(table, methods, name)]
+            maps = [_scroll(each, f"Success, {name}") for each in heatmaps.maps(table, methods, name)]
             yield tag("div", *maps, data_reaches=reaches, data_split=split)
 
 
@@ -61,7 +61,7 @@ def ridges(folder: Path, shown: list[Shown]) -> Iterator[Html]:
     """The ridge plots of the cases that explain the success model, with links to their recordings."""
     from dextron_bench.scores import figures
 
-    seen = showreel.ridges(folder, shown)
+    seen = highlights.ridges(folder, shown)
     if not seen:
         return
     titled = {f"{kind}\n({each.player})": each for kind, each in seen.items()}
@@ -70,7 +70,7 @@ def ridges(folder: Path, shown: list[Shown]) -> Iterator[Html]:
     cases = sorted((each for each in shown if each.kind in KINDS), key=lambda each: [*KINDS].index(each.kind))
     links = join(*(_recording(each, f"{KINDS[each.kind]} ({each.method})") for each in cases))
     caption = tag("figcaption", "Their recordings: ", tag("span", links, class_="links"))
-    yield tag("figure", _scroll(drawing.picture(svg, "ridges", label), "Ridge plots"), caption)
+    yield tag("figure", _scroll(page_svg.picture(svg, "ridges", label), "Ridge plots"), caption)
 
 
 def recordings(shown: list[Shown]) -> Iterator[Html]:
@@ -84,7 +84,7 @@ def recordings(shown: list[Shown]) -> Iterator[Html]:
             *(tag("td", text, class_="number") for text in (str(each.row), f"{each.score:.2f}")),
             tag("td", each.outcome),
         )
-        for method, own in sorted(showreel.by_method(shown).items())
+        for method, own in sorted(highlights.by_method(shown).items())
         for each in own
     ]
     if rows:
@@ -97,7 +97,7 @@ def recordings(shown: list[Shown]) -> Iterator[Html]:
 def _parts(rows: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """The rows of each source and split that ranks methods, in the order of the splits."""
     for reaches, own in rows.groupby("reaches"):
-        for split in splits.EVALUATED:
+        for split in EVALUATED:
             group = own[own["split"] == split]
             if not group.empty:
                 yield str(reaches), split, group
@@ -107,7 +107,7 @@ def _ending(row: Mapping[Any, Any]) -> Html:
     shares = [(cause, row[cause] / row["episodes"]) for cause in CAUSES]
     lag = UNKNOWN if pd.isna(row["closing_lag"]) else f"{row['closing_lag']:.2f}"
     cells = [tag("td", f"{100 * share:.1f}", class_="number", data_value=f"{share:.4f}") for _, share in shares]
-    bar = tag("td", drawing.shares(shares), class_="bar")
+    bar = tag("td", page_svg.shares(shares), class_="bar")
     return tag("tr", tag("th", row["method"], scope="row"), bar, *cells, tag("td", lag, class_="number"))
 
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dextron_bench.leaderboard.page import svg as drawing
+from dextron_bench.leaderboard.highlights import Shown
+from dextron_bench.leaderboard.page import svg
 from dextron_bench.leaderboard.page.html import UNKNOWN, Html, join, tag
 from dextron_bench.leaderboard.page.rows import QUOTED, Entry
-from dextron_bench.leaderboard.page.showreel import Shown
 
 Links = Mapping[str, Sequence[Shown]]
 
@@ -103,7 +103,7 @@ def _return(entry: Entry) -> Html:
     value, low, high = (entry.scores.get(f"return{end}") for end in ("", "_low", "_high"))
     interval = tag("span", f"[{low:.2f}, {high:.2f}]", class_="range") if low is not None else None
     text = tag("span", tag("b", f"{value:.2f}"), " ", interval, class_="figure")
-    return join(text, drawing.estimate(value or 0.0, low, high, 20.0))
+    return join(text, svg.estimate(value or 0.0, low, high, 20.0))
 
 
 def _success(entry: Entry) -> Html:

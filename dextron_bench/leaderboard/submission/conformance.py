@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dextron_bench.evaluation import rollout
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.rollout import AgentDown, AgentError
-from dextron_bench.methods.isolation.isolated_agent import Isolated, Launch, Limits
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.methods.agents import AgentCrashed, AgentError
+from dextron_bench.methods.isolation.isolated_agent import Isolated, Limits
+from dextron_bench.methods.isolation.launch import Launch
 from dextron_bench.reaches import sources
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import load_split
 from dextron_bench.world import model
 
 EPISODES = 8
@@ -60,9 +61,9 @@ def checks(how: Launch, reaches: str = "synthetic", limits: Limits | None = None
 
 
 def _play(how: Launch, reaches: str, limits: Limits, threads: int) -> list[Episode]:
-    cases = splits.load(reaches, "val").cases[:EPISODES]
+    cases = load_split(reaches, "val").cases[:EPISODES]
     with Isolated(how, 0, limits) as agent:
-        found = dict(rollout.rollout(agent, sources.open_source(reaches), cases, threads=threads))
+        found = dict(rollout(agent, sources.open_source(reaches), cases, threads=threads))
     return [found[place] for place in range(len(cases))]
 
 
@@ -85,7 +86,7 @@ def _company(how: Launch, episodes: Sequence[Episode], limits: Limits) -> Check:
         agent.reset(np.arange(len(order)))
         try:
             found = np.stack([agent.act(now[order]) for now in states])
-        except (AgentDown, AgentError) as error:
+        except (AgentCrashed, AgentError) as error:
             return Check(what, MEND, f"with {len(order)} episodes in place of {len(episodes)}: {error}")
     worst = float(np.abs(found - actions[:, order]).max())
     if worst == 0.0:
@@ -103,7 +104,7 @@ def _cost(how: Launch, episodes: Sequence[Episode], limits: Limits) -> Iterator[
             start = time.perf_counter()
             for _ in range(TIMED):
                 agent.act(states)
-        except (AgentDown, AgentError) as error:
+        except (AgentCrashed, AgentError) as error:
             yield Check("it is quick enough", MEND, f"with {CROWD} episodes at once: {error}")
             return
         each = 1e3 * (time.perf_counter() - start) / (TIMED * CROWD)

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.runs import run_files as records
+from dextron_bench.runs import result_files
 
 MANY = 0.5  # The share of equal episodes from which a submission counts as another's.
 
 
 def found(results: Mapping[int, dict[str, Any]], name: str, board: Path) -> Iterator[str]:
     """A line for each seed of results most of whose episodes on a split are those of another name's on the board."""
-    for other in records.results(board / "results"):
+    for other in result_files.results(board / "results"):
         if other["method"] == name:
             continue
         for seed, result in results.items():

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dextron_bench.leaderboard.submission.bundle import BadBundle
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import Split
 from dextron_bench.world import model, task
 
 SETTING = ("reach", "offset_x", "offset_y", "duration_noise")
@@ -26,7 +26,7 @@ MAY_LACK = {"closing_lag"}  # Where no hand closed.
 COLUMNS = {*FLAGS, *NUMBERS, *TEXTS, *COUNTS, *LISTS}
 
 
-def read(file: Path, wanted: Sequence[splits.Split]) -> pd.DataFrame:
+def read(file: Path, wanted: Sequence[Split]) -> pd.DataFrame:
     """The table in a file, of a known form and no larger than one of the splits can be; raises BadBundle, OSError."""
     rows = sum(len(split.cases) for split in wanted)
     try:
@@ -42,7 +42,7 @@ def read(file: Path, wanted: Sequence[splits.Split]) -> pd.DataFrame:
         raise BadBundle(f"{file.name} is no table that can be read ({error})") from error
 
 
-def faults(table: pd.DataFrame, wanted: Sequence[splits.Split]) -> Iterator[str]:
+def faults(table: pd.DataFrame, wanted: Sequence[Split]) -> Iterator[str]:
     """What is wrong with which rows are there and what they say was played, a line each."""
     for name in sorted(set(table["split"]) - {split.name for split in wanted}):
         yield f"{name} is none of the splits that rank methods"
@@ -51,7 +51,7 @@ def faults(table: pd.DataFrame, wanted: Sequence[splits.Split]) -> Iterator[str]
         yield from (f"{split.name}: {what}" for what in _faults(rows, split))
 
 
-def _faults(rows: pd.DataFrame, split: splits.Split) -> Iterator[str]:
+def _faults(rows: pd.DataFrame, split: Split) -> Iterator[str]:
     if set(rows["digest"]) - {split.digest}:
         yield f"was played on another version of the split than {split.digest[:8]}"
     counts = rows["row"].value_counts()

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.evaluation import episode_table
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches.setting import Source
-from dextron_bench.runs import run_files as records
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import Split
 
 TOLERANCE = 1e-3  # How far a number of the last state may be off on another platform.
 AGREEING = 0.99  # The share of episodes that must end alike there.
@@ -40,7 +40,7 @@ class Replayed:
 
 def again(
     source: Source,
-    wanted: Sequence[splits.Split],
+    wanted: Sequence[Split],
     table: pd.DataFrame,
     threads: int = 0,
     report: Report = lambda done, total: None,
@@ -50,7 +50,7 @@ def again(
     made, found = [], Replayed(pd.DataFrame())
     for split, row, told, episode in _played(source, wanted, table, threads):
         look(split.name, row, episode)
-        new = records.row(split, row, episode)
+        new = episode_table.row(split, row, episode)
         made.append(new)
         found.episodes += 1
         other = [name for name in EXACT if not _equal(new[name], told[name])]
@@ -64,8 +64,8 @@ def again(
 
 
 def _played(
-    source: Source, wanted: Sequence[splits.Split], table: pd.DataFrame, threads: int
-) -> Iterator[tuple[splits.Split, int, dict[str, Any], Episode]]:
+    source: Source, wanted: Sequence[Split], table: pd.DataFrame, threads: int
+) -> Iterator[tuple[Split, int, dict[str, Any], Episode]]:
     for split in wanted:
         rows = table[table["split"] == split.name].sort_values("row").to_dict("records")
         settings = [split.cases[row["row"]].setting for row in rows]

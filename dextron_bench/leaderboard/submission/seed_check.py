@@ -10,17 +10,14 @@ import pandas as pd
 
 from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode, trace
-from dextron_bench.evaluation.rollout import AgentError
-from dextron_bench.leaderboard.submission import bundle
-from dextron_bench.leaderboard.submission import episode_tables as tables
-from dextron_bench.leaderboard.submission import playing as contest
-from dextron_bench.leaderboard.submission import replay_check as replaying
+from dextron_bench.leaderboard.submission import bundle, episode_tables, playing, relaunch, replay_check
 from dextron_bench.leaderboard.submission.result_check import differences, same_platform
 from dextron_bench.leaderboard.submission.verdict import Verdict
+from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.reaches import sources
-from dextron_bench.runs import run_files as records
-from dextron_bench.splits import loading as splits
+from dextron_bench.runs import result_files, run_files
+from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic
 
 Report = Callable[[str, int, int], None]  # Told (what, episodes done, all).
@@ -35,7 +32,7 @@ class Seed:
         folder: Path,
         manifest: dict[str, Any],
         seed: int,
-        wanted: Sequence[splits.Split],
+        wanted: Sequence[Split],
         verdict: Verdict,
     ) -> None:
         self._folder, self._manifest, self._seed = folder / f"seed{seed}", manifest, seed
@@ -52,24 +49,24 @@ class Seed:
         except (bundle.BadBundle, atomic.DamagedFile) as error:
             self._object(str(error))
             return
-        if faults := list(tables.faults(table, self._wanted)):
+        if faults := list(episode_tables.faults(table, self._wanted)):
             self._object(*faults)
             return
         self._claimed = dict(zip(zip(table["split"], table["row"], strict=True), table["trace"], strict=True))
         self._lenient = not same_platform(result["provenance"])
         self._recorded = self._screened(report)
         source, what = sources.open_source(self._manifest["reaches"]), f"seed {self._seed}, replaying"
-        found = replaying.again(source, self._wanted, table, threads, lambda *done: report(what, *done), self._look)
+        found = replay_check.again(source, self._wanted, table, threads, lambda *done: report(what, *done), self._look)
         self._judge(found, result)
 
     def _read(self) -> tuple[pd.DataFrame, dict[str, Any]]:
         """The table of episodes and the result; raises BadBundle, DamagedFile."""
-        for name in (records.EPISODES, records.RESULT, records.PROVENANCE):
+        for name in (run_files.EPISODES, result_files.RESULT, run_files.PROVENANCE):
             if not (self._folder / name).exists():
                 raise bundle.BadBundle(f"lacks {name}")
-        table = tables.read(self._folder / records.EPISODES, self._wanted)
-        result = records.read_result(self._folder / records.RESULT)
-        bundle.check(result, "result", self._folder / records.RESULT)
+        table = episode_tables.read(self._folder / run_files.EPISODES, self._wanted)
+        result = result_files.read_result(self._folder / result_files.RESULT)
+        bundle.check(result, "result", self._folder / result_files.RESULT)
         return table, result
 
     def _screened(self, report: Report) -> dict[tuple[str, int], recording.Summary]:
@@ -85,9 +82,9 @@ class Seed:
         source, told = sources.open_source(self._manifest["reaches"]), self._manifest["agent"]
         total, done, other = sum(len(split.cases) for split in self._wanted), 0, []
         try:
-            how = contest.launch_of(told, self._agent_files)
+            how = relaunch.launch_of(told, self._agent_files)
             for split in self._wanted:
-                for row, episode in contest.shuffled(how, source, split, self._seed, limits, threads):
+                for row, episode in playing.shuffled(how, source, split, self._seed, limits, threads):
                     done += 1
                     if trace(episode) != self._traces[split.name, row]:
                         other.append(f"{split.name} row {row}: the agent, run again, acts otherwise")
@@ -96,22 +93,22 @@ class Seed:
             other.append(str(error))
         self._object(*other)
 
-    def _judge(self, found: replaying.Replayed, result: dict[str, Any]) -> None:
-        verdict, computed = self._verdict, records.scores(found.rows)
+    def _judge(self, found: replay_check.Replayed, result: dict[str, Any]) -> None:
+        verdict, computed = self._verdict, result_files.scores(found.rows)
         verdict.episodes += found.episodes
         verdict.exact += found.exact
         whose = {"method": self._manifest["name"], "reaches": self._manifest["reaches"], "seed": self._seed}
         told = result["provenance"]
-        if told != atomic.read_json(self._folder / records.PROVENANCE):
+        if told != atomic.read_json(self._folder / run_files.PROVENANCE):
             self._object("its result has another provenance than its run")
         if found.exact == found.episodes:
             self._object(*differences(result, whose | {"splits": computed, "provenance": told}))
-        elif not self._lenient or found.alike < replaying.AGREEING * found.episodes:
+        elif not self._lenient or found.alike < replay_check.AGREEING * found.episodes:
             self._object(*found.differing)
         else:
             verdict.notes.append(
                 f"seed{self._seed}: made on another platform; of {found.episodes} episodes {found.exact} are equal bit "
-                f"for bit, {found.alike} end alike with a last state within {replaying.TOLERANCE:g}"
+                f"for bit, {found.alike} end alike with a last state within {replay_check.TOLERANCE:g}"
             )
         verdict.tables[self._seed] = found.rows
         verdict.results[self._seed] = {

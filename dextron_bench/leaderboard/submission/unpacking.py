@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from dextron_bench.leaderboard.submission import bundle
-from dextron_bench.leaderboard.submission import episode_tables as tables
-from dextron_bench.leaderboard.submission import playing as contest
-from dextron_bench.runs import run_files as records
-from dextron_bench.splits import loading as splits
+from dextron_bench.leaderboard.submission import bundle, entry, episode_tables
+from dextron_bench.runs import run_files
+from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import hashing
 
-FOLDER = Path(contest.FOLDER, ".bundles")  # In the folder of runs; no submission can be called so.
+FOLDER = Path(entry.FOLDER, ".bundles")  # In the folder of runs; no submission can be called so.
 
 
 def opened(file: Path, runs: Path) -> Path:
@@ -30,9 +28,9 @@ def opened(file: Path, runs: Path) -> Path:
     with TemporaryDirectory(prefix=".unpacking-", dir=place.parent) as folder:
         part = Path(folder) / "bundle"
         manifest = bundle.unpack(file, part)
-        wanted = [splits.load(manifest["reaches"], name) for name in splits.evaluated(manifest["reaches"])]
-        for table in part.glob(f"seed*/{records.EPISODES}"):
-            for fault in tables.faults(tables.read(table, wanted), wanted):
+        wanted = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
+        for table in part.glob(f"seed*/{run_files.EPISODES}"):
+            for fault in episode_tables.faults(episode_tables.read(table, wanted), wanted):
                 raise bundle.BadBundle(f"{file}: {table.parent.name}: {fault}")
         part.replace(place)
     return place

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.leaderboard.submission import duplicates as copies
+from dextron_bench.leaderboard.submission import duplicates
 from dextron_bench.leaderboard.submission.seed_check import Report, Seed
 from dextron_bench.leaderboard.submission.verdict import Verdict
 from dextron_bench.methods.isolation import sandbox
 from dextron_bench.methods.isolation.isolated_agent import Limits
-from dextron_bench.splits import loading as splits
+from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.world import model
 
 
@@ -35,7 +35,7 @@ def verify(
         return verdict
     if sorted(manifest["seeds"]) != list(range(len(manifest["seeds"]))):
         verdict.problems.append(f"has seeds {manifest['seeds']}; they must be 0, 1, 2 and so on, none chosen")
-    wanted = [splits.load(manifest["reaches"], name) for name in splits.evaluated(manifest["reaches"])]
+    wanted = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
     seeds = [Seed(folder, manifest, seed, wanted, verdict) for seed in manifest["seeds"]]
     for each in seeds:
         each.check(threads, report)
@@ -43,10 +43,10 @@ def verify(
         verdict.problems.append(f"seed{unasked[0]} is there, but not among the seeds that it claims")
     if rerun and verdict.sound:
         _rerun(folder, seeds, verdict, lambda seed: seed.rerun(limits or Limits(), threads, report))
-    if len(verdict.results) > 1 and copies.all_equal(verdict.results):
+    if len(verdict.results) > 1 and duplicates.all_equal(verdict.results):
         verdict.notes.append("all seeds have the same episodes: they count as one, not as several trainings")
     if board is not None and verdict.sound:
-        same = list(copies.found(verdict.results, manifest["name"], board))
+        same = list(duplicates.found(verdict.results, manifest["name"], board))
         (verdict.notes if rerun else verdict.problems).extend(same)
     return verdict
 

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
-import json
-import shlex
-import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass, field
-from importlib.machinery import ModuleSpec
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from dextron_bench.evaluation.rollout import AgentDown, AgentError
-from dextron_bench.methods.isolation import protocol as wire
-from dextron_bench.methods.isolation import sandbox
+from dextron_bench.methods.agents import AgentCrashed, AgentError
+from dextron_bench.methods.isolation import protocol
+from dextron_bench.methods.isolation.launch import Launch
 from dextron_bench.methods.isolation.process import Process, Silent
 
 
@@ -35,73 +28,10 @@ class Limits:
             raise AgentError("an agent needs time and memory: --timeout and --memory are more than 0")
 
 
-@dataclass(frozen=True, slots=True)
-class Launch:
-    """What starts an agent's process: words of a command, or, for Python's, what `worker` is told."""
-
-    command: tuple[str, ...] = ()
-    kind: str = ""
-    spec: str = ""
-    settings: dict[str, Any] = field(default_factory=dict)
-    weights: str = ""
-    own: tuple[str, ...] = ()
-
-    def words(self, scratch: str, memory: int) -> list[str]:
-        """The command, for a folder that the process may write to."""
-        told = {**asdict(self), "scratch": scratch}
-        worker = [sys.executable, "-P", "-m", "dextron_bench.methods.isolation.worker", json.dumps(told)]
-        return sandbox.wrap(self.command or worker, scratch, self.own, memory)
-
-
-def launch(spec: str, settings: dict[str, Any] | None = None, weights: Path | None = None) -> Launch:
-    """How to start the agent that a user names.
-
-    `exec:COMMAND` is a program that speaks the protocol, `FILE.pt` and `FILE.onnx` are policies, `file.py:Class` and
-    `module:Class` are code, all else is an installed method. `weights` are of a method that learns. Raises AgentError.
-    """
-    file = str(weights.resolve()) if weights else ""
-    more = {"settings": settings or {}, "weights": file, "own": (file,) if file else ()}
-    place, _, name = spec.rpartition(":")
-    if spec.startswith("exec:"):
-        words = _words(spec.removeprefix("exec:"))
-        files = [str(Path(word).resolve()) for word in words if Path(word).is_file()]
-        command = tuple(str(Path(word).resolve()) if Path(word).is_file() else word for word in words)
-        return Launch(command=command, own=tuple(str(Path(file).parent) for file in files))
-    if Path(spec).suffix in (".pt", ".onnx"):
-        whole = str(Path(spec).resolve())
-        if not Path(whole).is_file():
-            raise AgentError(f"there is no file {spec}")
-        return Launch(kind="policy", spec=whole, own=(whole,))
-    if spec.endswith(".py"):
-        raise AgentError(f"{spec} is a file: name its class too, as in {spec}:MyAgent")
-    if place.endswith(".py"):
-        if not Path(place).is_file():
-            raise AgentError(f"there is no file {place}")
-        more["own"] += (str(Path(place).resolve()),)
-        return Launch(kind="code", spec=f"{Path(place).resolve()}:{name}", **more)
-    if place and (found := _module(place.partition(".")[0])):
-        more["own"] += tuple(found.submodule_search_locations or [found.origin or ""])
-    return Launch(kind="code" if place else "method", spec=spec, **more)
-
-
-def _words(command: str) -> list[str]:
-    try:
-        return shlex.split(command)
-    except ValueError as error:
-        raise AgentError(f"exec:{command} is no command ({error})") from error
-
-
-def _module(name: str) -> ModuleSpec | None:
-    try:
-        return importlib.util.find_spec(name)
-    except ValueError as error:
-        raise AgentError(f"{name} is no module that agents can come from ({error})") from error
-
-
 class Isolated:
     """Plays the agent of a process; use it as a context, or `close` it.
 
-    Raises AgentError where the process does not start the first time; what goes wrong later raises AgentDown, which
+    Raises AgentError where the process does not start the first time; what goes wrong later raises AgentCrashed, which
     fails the episodes that were being played, and the next question starts the process again.
     """
 
@@ -130,39 +60,39 @@ class Isolated:
         self._begun += episodes.tolist()
 
     def act(self, states: np.ndarray) -> np.ndarray:
-        """Actions (N, 1) for states (N, 48); raises AgentDown, AgentError."""
+        """Actions (N, 1) for states (N, 48); raises AgentCrashed, AgentError."""
         begun, self._begun = sorted(set(self._begun)), []
         if self._spent > self._limits.total:
             self._stop()
-            raise AgentDown(f"it has had the {self._limits.total:g} s that all its answers may take")
+            raise AgentCrashed(f"it has had the {self._limits.total:g} s that all its answers may take")
         asked = time.monotonic()
         try:
-            return self._answer(wire.question(begun, states), len(states))
+            return self._answer(protocol.question(begun, states), len(states))
         finally:
             self._spent += time.monotonic() - asked
 
     def _answer(self, question: bytes, count: int) -> np.ndarray:
         process = self._process or self._start(count)
         try:
-            return wire.actions(process.ask(question, self._limits.answer), count)
-        except (wire.BadAnswer, Silent) as error:
+            return protocol.actions(process.ask(question, self._limits.answer), count)
+        except (protocol.BadAnswer, Silent) as error:
             why = process.epitaph(error)
             self._stop()
-            raise AgentDown(why) from error
+            raise AgentCrashed(why) from error
 
     def _start(self, episodes: int) -> Process:
         self.starts += 1
         try:
             words = self._how.words(self._scratch.name, self._limits.memory)
-            process = self._process = Process(words, self._scratch.name, wire.longest(episodes))
+            process = self._process = Process(words, self._scratch.name, protocol.longest(episodes))
         except (OSError, IndexError) as error:
             raise AgentError(f"the agent's process cannot be started: {error}") from error
         try:
-            wire.greeted(process.ask(wire.greeting(self._seed, episodes), self._limits.start))
-        except (wire.BadAnswer, Silent) as error:
+            protocol.greeted(process.ask(protocol.greeting(self._seed, episodes), self._limits.start))
+        except (protocol.BadAnswer, Silent) as error:
             why = process.epitaph(error)
             self._stop()
-            raise (AgentDown if self.starts > 1 else AgentError)(f"the agent did not start: {why}") from error
+            raise (AgentCrashed if self.starts > 1 else AgentError)(f"the agent did not start: {why}") from error
         return process
 
     def _stop(self) -> None:

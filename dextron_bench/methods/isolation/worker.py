@@ -14,10 +14,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from dextron_bench.methods import loading as entrants
-from dextron_bench.methods.isolation import guard
-from dextron_bench.methods.isolation import policy_files as policies
-from dextron_bench.methods.isolation import protocol as wire
+from dextron_bench.methods import loading
+from dextron_bench.methods.isolation import guard, policy_files, protocol
 from dextron_bench.storage import tensors
 
 GROUP = "dextron_bench.methods"
@@ -32,7 +30,7 @@ def main(told: dict[str, Any]) -> None:
     guard.close([Path(place) for place in told["own"]], Path(told["scratch"]))
     seed = json.loads(questions.readline())["seed"]
     agent = _made(told, installed, seed)
-    answers.write(json.dumps({"protocol": wire.PROTOCOL, "name": told["spec"]}).encode() + b"\n")
+    answers.write(json.dumps({"protocol": protocol.PROTOCOL, "name": told["spec"]}).encode() + b"\n")
     answers.flush()
     serve(agent, questions, answers)
 
@@ -40,7 +38,7 @@ def main(told: dict[str, Any]) -> None:
 def serve(agent: Any, questions: BinaryIO, answers: BinaryIO) -> None:
     """Answers each question with an agent's `reset` and `act`."""
     for line in questions:
-        reset, states = wire.asked(line)
+        reset, states = protocol.asked(line)
         if len(reset):
             agent.reset(reset)
         found = np.asarray(agent.act(states))
@@ -49,7 +47,7 @@ def serve(agent: Any, questions: BinaryIO, answers: BinaryIO) -> None:
                 f"act() must return floats of shape ({len(states)}, 1) for states of shape {states.shape}; "
                 f"it returned {found.dtype} of shape {found.shape}"
             )
-        answers.write(wire.answer(found))
+        answers.write(protocol.answer(found))
         answers.flush()
 
 
@@ -64,13 +62,13 @@ def _installed(spec: str) -> Any:
 def _made(told: dict[str, Any], installed: Any, seed: int) -> Any:
     """The agent, ready to act."""
     if told["kind"] == "policy":
-        return policies.load(Path(told["spec"]))
-    found = installed or entrants.find(told["spec"])
+        return policy_files.load(Path(told["spec"]))
+    found = installed or loading.find(told["spec"])
     if not isinstance(found, type) or not hasattr(found, "name"):
         raise LookupError(f"{told['spec']!r} is no class with a `name`")
     method = found(**told["settings"])
     if told["weights"]:
-        taught = getattr(method, "teacher", method)
+        taught = getattr(method, "source_policy", method)
         return taught.policy(tensors.read(Path(told["weights"])))
     return method.agent(seed)
 

@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from dextron_bench.reaches.reach import Reach
-from dextron_bench.reaches.recorded import parsing as raw
-from dextron_bench.reaches.recorded import release
+from dextron_bench.reaches.recorded import parsing, release
 from dextron_bench.reaches.recorded.release import Manifest
 
 CACHE_FILE = "real-reaches.npz"
@@ -144,4 +143,4 @@ def _reaches(columns: dict[str, np.ndarray]) -> list[Reach]:
         columns["reached"].tolist(),
         strict=True,
     )
-    return [Reach(name, t, x, q, reached, *raw.origin(name)) for name, t, x, q, reached in parts]
+    return [Reach(name, t, x, q, reached, *parsing.origin(name)) for name, t, x, q, reached in parts]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dextron_bench.reaches.reach import Reach
-from dextron_bench.reaches.recorded import parsing as raw
+from dextron_bench.reaches.recorded import parsing
 
 SHIPPED = Path(__file__).parents[2] / "data" / "real-manifest.json"
 MAX_FILE = 1_000_000  # [bytes] far above the largest recording (41 kB), far below what hurts.
@@ -62,8 +62,8 @@ def read(where: Path, manifest: Manifest, progress: Callable[[int, int], None] |
             samples, notes = f"extracts/{name}.json", f"extracts/meta/{name}_meta.json"
             try:
                 recording, marks = reader(samples), reader(notes)
-                reach = raw.parse(name, recording, marks)
-            except raw.RawError as error:
+                reach = parsing.parse(name, recording, marks)
+            except parsing.RawError as error:
                 raise ReleaseError(str(error)) from error
             _verify(manifest, {samples: recording, notes: marks})
             reaches.append(reach)

@@ -15,7 +15,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.special import ndtr, ndtri
 
 from dextron_bench.reaches.reach import Reach
-from dextron_bench.reaches.synthetic import generator as model
+from dextron_bench.reaches.synthetic import generator
 from dextron_bench.reaches.synthetic.encoding import Encoded, encode, grasping_orientation, log_stretches
 from dextron_bench.reaches.synthetic.generator import (
     CHANNELS,
@@ -75,22 +75,22 @@ def fit(reaches: Sequence[Reach], seed: int) -> Parameters:
     features = np.where(np.isnan(features), np.nanmedian(features, axis=0), features)
     linear = linear_part(features, groups)
     sensor = lag_part(reaches, encoded, groups) | noise_part(encoded, features)
-    nothing = np.zeros((0, len(model.SPREAD)))
+    nothing = np.zeros((0, len(generator.SPREAD)))
     rough = stored(Parameters(reference, phases, **linear, **sensor, drawn=nothing, recorded=nothing))
     return stored(replace(rough, **rehearsed(rough, features, np.random.default_rng(seed))))
 
 
 def levels(values: np.ndarray) -> np.ndarray:
     """Quantiles (n, Q) at SPREAD of the columns of values (m, n)."""
-    return np.quantile(values, ndtr(model.SPREAD), axis=0).T
+    return np.quantile(values, ndtr(generator.SPREAD), axis=0).T
 
 
 def linear_part(features: np.ndarray, groups: Groups) -> dict[str, np.ndarray]:
     """Means, effects, components and scales of features (n, F)."""
     people, meetings = groups.subjects.max() + 1, len(groups.subjects)
     person = np.eye(people)[groups.subject]
-    design = [np.eye(REGIONS)[model.ANGLES * groups.ring + groups.angle], np.eye(meetings)[groups.session]]
-    design += [person * (place - model.CENTRE)[:, None] for place in (groups.ring, groups.angle)]
+    design = [np.eye(REGIONS)[generator.ANGLES * groups.ring + groups.angle], np.eye(meetings)[groups.session]]
+    design += [person * (place - generator.CENTRE)[:, None] for place in (groups.ring, groups.angle)]
     effects = np.linalg.lstsq(np.concatenate(design, axis=1), features, rcond=None)[0]
     left = features - np.concatenate(design, axis=1) @ effects
     units = np.repeat(UNITS, (STRETCHES, NOISES, SIZES, WEIGHTS * CHANNELS))
@@ -136,7 +136,7 @@ def lag_part(reaches: Sequence[Reach], encoded: Sequence[Encoded], groups: Group
         own = [lags for lags, subject in zip(known, groups.subject, strict=True) if subject == k]
         pool = np.sort(np.concatenate(own))
         pool = pool[~np.isnan(pool)]
-        quantiles.append(np.quantile(pool, ndtr(model.SPREAD)))
+        quantiles.append(np.quantile(pool, ndtr(generator.SPREAD)))
         ranks = [np.clip(np.searchsorted(pool, lags) / len(pool), TAIL, 1.0 - TAIL) for lags in own]
         scores = [np.where(np.isnan(lags), np.nan, ndtri(rank)) for lags, rank in zip(own, ranks, strict=True)]
         products = [np.nanmean(np.concatenate([z[: len(z) - j] * z[j:] for z in scores])) for j in range(LAG_ORDER + 1)]
@@ -180,7 +180,7 @@ def rehearsed(p: Parameters, features: np.ndarray, rng: np.random.Generator) -> 
     """Quantiles of all features but the weights, as the components draw them and as recorded (n, F)."""
     count = STRETCHES + NOISES + SIZES
     plan = [(region, session) for session in range(len(p.sessions)) for region in range(REGIONS)] * REHEARSALS
-    drawn = np.array([model.draw_features(rng, p, *each)[:count] for each in plan])
+    drawn = np.array([generator.draw_features(rng, p, *each)[:count] for each in plan])
     return {"drawn": levels(drawn), "recorded": levels(features[:, :count])}
 
 

@@ -13,7 +13,7 @@ from typing import Protocol, Self
 import mujoco
 import numpy as np
 
-from dextron_bench.world.rendering import visuals as dressing
+from dextron_bench.world.rendering import visuals
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # Ways to draw without a screen, best first, and what each needs.
 INSTALL = (
@@ -83,7 +83,7 @@ class Painter:
         """Takes the size of pictures [pixels] and how many times finer they are rendered; raises NoGraphics."""
         self._finer = supersampling
         self._size = width, height = width * supersampling, height * supersampling
-        self._model = dressing.dressed()
+        self._model = visuals.visual_model()
         self._data = mujoco.MjData(self._model)
         with warnings.catch_warnings(action="ignore"):  # GLFW says by them what the errors below do.
             self._context = context(width, height)

@@ -60,7 +60,7 @@ class _Dresser:
 
 
 @cache
-def dressed() -> mujoco.MjModel:
+def visual_model() -> mujoco.MjModel:
     """The model for pictures, shared; its states are those of the physics model."""
     spec = mujoco.MjSpec.from_string(model.mjcf())
     for geom in spec.geoms:

@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 
 from dextron_bench.evaluation.diagnosis import CAUSES
-from dextron_bench.leaderboard import page
-from dextron_bench.scores import standings as leaderboard
-from dextron_bench.splits import loading as splits
+from dextron_bench.leaderboard import page as leaderboard_page
+from dextron_bench.scores import standings
+from dextron_bench.splits.loading import load_split
 from tests.helpers.browser import visit
 
 BOARD = Path(__file__).parents[3] / "leaderboard"
-PUBLISHED = (BOARD / page.FILE).as_uri()
+PUBLISHED = (BOARD / leaderboard_page.FILE).as_uri()
 ALL = f"{PUBLISHED}#reaches=&split="  # Without the choice that the page begins with.
 EVIL = "<script>alert(1)</script>", """"><img src=x onerror=alert(1)>'&amp; $x$ ]]>"""
 Table = dict[tuple[str, str, str], dict[str, Any]]  # Rows by method, source of reaches and split.
@@ -30,16 +30,16 @@ def table() -> Table:
 @pytest.fixture
 def evil(tmp_path: Path) -> str:
     """The address of a page of methods whose names, tiers and machines are no names at all."""
-    rows = leaderboard.table([*map(result, EVIL)]).assign(rank=[1, 1], iqm=[19.5, 18.25], regret=[0.5, 1.75])
+    rows = standings.table([*map(result, EVIL)]).assign(rank=[1, 1], iqm=[19.5, 18.25], regret=[0.5, 1.75])
     points = pd.DataFrame({"epoch": [10, 20], "return": [1.0, 2.0]})
     curves = {"minjerk": {method: {0: points} for method in EVIL}}
-    file = tmp_path / page.FILE
-    file.write_text(page.document(rows, map(result, EVIL), curves, tmp_path), encoding="utf-8")
+    file = tmp_path / leaderboard_page.FILE
+    file.write_text(leaderboard_page.document(rows, map(result, EVIL), curves, tmp_path), encoding="utf-8")
     return file.as_uri()
 
 
 def result(method: str) -> dict[str, Any]:
-    split = splits.load("minjerk", "test")
+    split = load_split("minjerk", "test")
     scores = [20.0] * 150 + [0.0] * 50
     found = {"digest": split.digest, "scores": scores, "failed": 0, "closing_lag": 0.1}
     training = {"label": method + "!", "frames": 1000, "demonstrations": 12_345, "seconds": 5400.0}
@@ -212,8 +212,10 @@ def test_names_of_strangers_are_text_wherever_they_stand(browser: Any, evil: str
 
 def test_no_script_but_its_own_may_run(browser: Any, tmp_path: Path):
     """Should a name ever get through unescaped, the browser refuses it."""
-    file = tmp_path / page.FILE
-    file.write_text((BOARD / page.FILE).read_text().replace("</main>", "<script>window.ran = 1</script></main>"))
+    file = tmp_path / leaderboard_page.FILE
+    file.write_text(
+        (BOARD / leaderboard_page.FILE).read_text().replace("</main>", "<script>window.ran = 1</script></main>")
+    )
     opened = browser.new_page()
     opened.goto(file.as_uri())
     assert opened.evaluate("window.ran") is None
@@ -230,6 +232,6 @@ def test_links_to_recordings_lead_to_files_that_ship(browser: Any):
 
 
 def test_equal_results_make_equal_pages(tmp_path: Path):
-    rows = leaderboard.table(map(result, EVIL))
-    made = {page.document(rows, map(result, EVIL), {}, tmp_path) for _ in range(2)}
+    rows = standings.table(map(result, EVIL))
+    made = {leaderboard_page.document(rows, map(result, EVIL), {}, tmp_path) for _ in range(2)}
     assert len(made) == 1

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.leaderboard.submission import bundle
-from dextron_bench.leaderboard.submission import playing as contest
+from dextron_bench.leaderboard.submission import bundle, entry
 from tests.helpers import tiny_benchmark
 
 
@@ -104,10 +103,10 @@ def test_a_changed_byte_is_refused(submitted: Path, unsafe: Unsafe, tmp_path: Pa
 
 def test_only_what_belongs_to_the_seeds_is_packed(submitted: Path, tmp_path: Path):
     """A write that was cut off leaves its part, and a seed that was played is not always submitted."""
-    folder = submitted / "runs" / contest.FOLDER / "near" / tiny_benchmark.NAME
+    folder = submitted / "runs" / entry.FOLDER / "near" / tiny_benchmark.NAME
     shutil.copytree(folder, tmp_path / "near")
     (tmp_path / "near/seed0/.episodes.parquet.77.part").touch()
-    told = contest.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0,)).told()
+    told = entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0,)).told()
     found = bundle.pack(tmp_path / "near", told, {}, tmp_path / "near.zip")["files"]
     assert {name.split("/")[0] for name in found} == {"seed0"}
     assert not [name for name in found if "part" in name]

@@ -10,9 +10,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from dextron_bench.leaderboard.submission.conformance import MEND, NOTE, OK, Check, checks
-from dextron_bench.methods.isolation.isolated_agent import Limits, launch
+from dextron_bench.methods.isolation.isolated_agent import Limits
+from dextron_bench.methods.isolation.launch import launch
 from tests.helpers import tiny_benchmark
 
 AGENT = """
@@ -56,14 +57,14 @@ def found(tmp_path: Path, act: str) -> dict[str, Check]:
 
 def test_the_agent_to_begin_with_is_ready_and_passes_its_own_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     folder = tmp_path / "mine"
-    assert cli.main(["new-agent", str(folder)]) == 0
+    assert main.main(["new-agent", str(folder)]) == 0
     done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"], cwd=folder, check=False)
     assert done.returncode == 0
-    assert cli.main(["check", f"{folder}/agent.py:MyAgent"]) == 0
+    assert main.main(["check", f"{folder}/agent.py:MyAgent"]) == 0
     told = capsys.readouterr().out
     assert "mend" not in told
     assert "ready: dextron-bench submit" in told
-    assert cli.main(["new-agent", str(folder)]) == 2
+    assert main.main(["new-agent", str(folder)]) == 2
     assert "is there already; name a new folder" in capsys.readouterr().err
 
 

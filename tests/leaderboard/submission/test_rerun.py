@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.leaderboard.submission import playing as contest
+from dextron_bench.leaderboard.submission import playing, relaunch
 from tests.helpers.forged_bundles import Forgery
 
 
@@ -62,7 +62,7 @@ def test_an_agent_that_cannot_be_run_again_is_told(forged: Forgery):
 def test_a_manifest_starts_nothing_but_what_its_bundle_brought(
     kind: str, spec: str, forged: Forgery, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(contest, "launch", lambda *_: pytest.fail("it was started"))
+    monkeypatch.setattr(playing, "launch", lambda *_: pytest.fail("it was started"))
     forged.json("bundle.json", lambda told: told["agent"].update(kind=kind, spec=spec))
     assert f"{spec!r} names no agent of kind {kind!r}" in forged.checked(rerun=True).problems[0]
 
@@ -82,7 +82,7 @@ def test_agents_of_each_kind_are_started_from_the_bundle(kind: str, spec: str, w
     for name in ("near.py", "policy.pt", "policy.onnx", "seed0.safetensors"):
         (tmp_path / name).touch()
     told = {"kind": kind, "spec": spec, "settings": {}, "weights": weights}
-    how = contest.launch_of(told, tmp_path)
+    how = relaunch.launch_of(told, tmp_path)
     assert (how.kind, how.command) == (kind, ())
     inside = kind == "policy" or ".py:" in spec
     assert how.spec == (f"{tmp_path}/{spec}" if inside else spec)

@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 
 from dextron_bench import recording
-from dextron_bench.leaderboard.submission import playing as contest
-from dextron_bench.leaderboard.submission import result_check as differences
+from dextron_bench.leaderboard.submission import entry as submission_entry
+from dextron_bench.leaderboard.submission import playing, result_check
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.reaches import sources
-from dextron_bench.runs import run_files as records
-from dextron_bench.splits import loading as splits
+from dextron_bench.runs import run_files
+from dextron_bench.splits.loading import Split, cases_from_frame
 from dextron_bench.storage import provenance
 from tests.helpers import tiny_benchmark
 from tests.helpers.forged_bundles import Forgery, row
@@ -33,25 +33,25 @@ def test_a_sound_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forg
 
 
 def test_equal_submissions_are_equal_bytes_and_nothing_is_played_twice(submitted: Path, tmp_path: Path):
-    entry = contest.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0, 1))
+    entry = submission_entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0, 1))
 
     def forbidden(*_: object) -> None:
         raise AssertionError("played again")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contest, "shuffled", forbidden)
-        folder = contest.compete(entry, submitted / "runs", 1, Limits(), threads=1)
-    contest.finish(entry, folder, tmp_path / "again.zip")
+        patch.setattr(playing, "shuffled", forbidden)
+        folder = playing.compete(entry, submitted / "runs", 1, Limits(), threads=1)
+    playing.finish(entry, folder, tmp_path / "again.zip")
     assert (tmp_path / "again.zip").read_bytes() == (submitted / "near.zip").read_bytes()
 
 
 def test_episodes_are_played_in_an_order_that_depends_on_split_and_seed():
-    split = splits.Split("test", "synthetic", tuple(splits.cases(tiny_benchmark.ROWS)) * 20, "0" * 64)
-    first, second = contest.order(split, 0), contest.order(split, 1)
+    split = Split("test", "synthetic", tuple(cases_from_frame(tiny_benchmark.ROWS)) * 20, "0" * 64)
+    first, second = playing.order(split, 0), playing.order(split, 1)
     assert sorted(first) == list(range(len(split.cases)))
     assert list(first) != list(range(len(first)))
     assert list(first) != list(second)
-    assert list(contest.order(replace(split, digest="1" * 64), 0)) != list(first)
+    assert list(playing.order(replace(split, digest="1" * 64), 0)) != list(first)
 
 
 def test_a_changed_reward_is_caught(forged: Forgery):
@@ -61,7 +61,7 @@ def test_a_changed_reward_is_caught(forged: Forgery):
 
 
 def test_a_changed_action_is_caught(forged: Forgery):
-    told = pd.read_parquet(forged.seed / records.EPISODES).query("split == 'test' and row == 0")
+    told = pd.read_parquet(forged.seed / run_files.EPISODES).query("split == 'test' and row == 0")
     actions = np.array(told["actions"].iloc[0])
     actions[-1] = np.nextafter(actions[-1], 0.0)
     forged.table(row(0, actions=actions))
@@ -196,11 +196,11 @@ def test_a_machine_is_of_the_same_platform_as_itself(monkeypatch: pytest.MonkeyP
     """On a Mac the name of the system has two forms."""
     monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
     monkeypatch.setattr("platform.system", lambda: "Darwin")
-    assert differences.same_platform(provenance.collect(""))
+    assert result_check.same_platform(provenance.collect(""))
     monkeypatch.setattr("platform.platform", lambda *_: "Linux-6.1-x86_64")
     here = provenance.collect("")
     monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
-    assert not differences.same_platform(here)
+    assert not result_check.same_platform(here)
 
 
 def test_another_platform_is_held_to_outcomes_and_says_so(forged: Forgery):

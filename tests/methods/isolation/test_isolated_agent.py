@@ -18,17 +18,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.rollout import AgentError, rollout
+from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case
-from dextron_bench.methods.isolation import policy_files as policies
-from dextron_bench.methods.isolation import protocol as wire
-from dextron_bench.methods.isolation import sandbox
-from dextron_bench.methods.isolation.isolated_agent import Isolated, Limits, launch
-from dextron_bench.splits import loading as splits
+from dextron_bench.methods.agents import AgentError
+from dextron_bench.methods.isolation import policy_files, protocol, sandbox
+from dextron_bench.methods.isolation.isolated_agent import Isolated, Limits
+from dextron_bench.methods.isolation.launch import launch
+from dextron_bench.splits.loading import cases_from_frame
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.tiny_benchmark import ROWS
 
-CASES: list[Case] = splits.cases(ROWS[:3])
+CASES: list[Case] = cases_from_frame(ROWS[:3])
 AGENT = """
 import numpy as np
 from dextron_bench.world import task
@@ -258,8 +258,8 @@ def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
     torch.save({"weights": 1}, file)
     with pytest.raises(AgentError, match="is no TorchScript file"):
         play(str(file))
-    with pytest.raises(policies.BadPolicy, match=r"known kinds end in \.pt, \.onnx"):
-        policies.load(tmp_path / "policy.pkl")
+    with pytest.raises(policy_files.BadPolicy, match=r"known kinds end in \.pt, \.onnx"):
+        policy_files.load(tmp_path / "policy.pkl")
 
 
 def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):
@@ -288,15 +288,15 @@ def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):
 
 @given(st.binary(max_size=200), st.integers(1, 5))
 def test_whatever_a_process_writes_is_actions_or_a_bad_answer(line: bytes, count: int):
-    with suppress(wire.BadAnswer):
-        assert wire.actions(line, count).shape == (count, 1)
+    with suppress(protocol.BadAnswer):
+        assert protocol.actions(line, count).shape == (count, 1)
 
 
 @given(st.lists(st.floats(), min_size=1, max_size=5))
 def test_actions_come_through_bit_for_bit(actions: list[float]):
     sent = np.array(actions)[:, None]
-    np.testing.assert_array_equal(wire.actions(wire.answer(sent), len(actions)), sent)
+    np.testing.assert_array_equal(protocol.actions(protocol.answer(sent), len(actions)), sent)
     states = np.array(actions)[:, None].repeat(48, axis=1)
-    rows, found = wire.asked(wire.question([0], states))
+    rows, found = protocol.asked(protocol.question([0], states))
     assert rows.tolist() == [0]
     np.testing.assert_array_equal(found, states)

@@ -11,7 +11,7 @@ import pytest
 
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.reach import Reach
-from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.recorded.release import Manifest
 from tests.conftest import NAMES, Published
 
@@ -34,61 +34,61 @@ def same(a: list[Reach], b: list[Reach]) -> bool:
 
 def test_what_was_imported_comes_back_bit_for_bit(published: Published):
     manifest = Manifest.load(published.manifest)
-    imported = archive.import_release(published.zip(), manifest)
-    assert same(imported, archive.load_reaches(manifest))
+    imported = recorded_cache.import_release(published.zip(), manifest)
+    assert same(imported, recorded_cache.load_reaches(manifest))
 
 
 def test_nothing_anywhere_says_how_to_get_it(published: Published):
-    with pytest.raises(archive.MissingData, match=r"data import --from .*data fetch"):
-        archive.load_reaches(Manifest.load(published.manifest))
+    with pytest.raises(recorded_cache.MissingData, match=r"data import --from .*data fetch"):
+        recorded_cache.load_reaches(Manifest.load(published.manifest))
 
 
 def test_the_environment_names_a_release_where_no_cache_is(published: Published, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("DEXTRON_DATA", str(published.unpacked()))
-    assert [reach.name for reach in archive.load_reaches(Manifest.load(published.manifest))] == list(NAMES)
+    assert [reach.name for reach in recorded_cache.load_reaches(Manifest.load(published.manifest))] == list(NAMES)
 
 
 def test_a_cache_of_another_release_does_not_count(published: Published):
-    archive.import_release(published.zip(), Manifest.load(published.manifest))
-    with pytest.raises(archive.MissingData, match="from another release"):
-        archive.load_reaches(Manifest.load())
+    recorded_cache.import_release(published.zip(), Manifest.load(published.manifest))
+    with pytest.raises(recorded_cache.MissingData, match="from another release"):
+        recorded_cache.load_reaches(Manifest.load())
 
 
 def test_a_changed_cache_does_not_count(published: Published):
     manifest = Manifest.load(published.manifest)
-    archive.import_release(published.zip(), manifest)
-    with np.load(archive.cache_file()) as stored:
+    recorded_cache.import_release(published.zip(), manifest)
+    with np.load(recorded_cache.cache_file()) as stored:
         columns = dict(stored)
     columns["positions"][0, 0] += 1e-9
-    with archive.cache_file().open("wb") as file:
+    with recorded_cache.cache_file().open("wb") as file:
         np.savez(file, allow_pickle=False, **columns)
-    with pytest.raises(archive.MissingData, match="damaged"):
-        archive.load_reaches(manifest)
+    with pytest.raises(recorded_cache.MissingData, match="damaged"):
+        recorded_cache.load_reaches(manifest)
 
 
 @pytest.mark.parametrize("size", [0, 10, 400, 2000])
 def test_a_cut_cache_does_not_count(published: Published, size: int):
     manifest = Manifest.load(published.manifest)
-    archive.import_release(published.zip(), manifest)
-    archive.cache_file().write_bytes(archive.cache_file().read_bytes()[:size])
-    with pytest.raises(archive.MissingData, match="cannot be read"):
-        archive.load_reaches(manifest)
+    recorded_cache.import_release(published.zip(), manifest)
+    recorded_cache.cache_file().write_bytes(recorded_cache.cache_file().read_bytes()[:size])
+    with pytest.raises(recorded_cache.MissingData, match="cannot be read"):
+        recorded_cache.load_reaches(manifest)
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
 def test_a_failed_write_leaves_the_cache_as_it_was(published: Published, monkeypatch: pytest.MonkeyPatch, call: str):
     manifest = Manifest.load(published.manifest)
-    archive.import_release(published.zip(), manifest)
-    before = archive.cache_file().read_bytes()
+    recorded_cache.import_release(published.zip(), manifest)
+    before = recorded_cache.cache_file().read_bytes()
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, call, full)
     with pytest.raises(OSError, match="No space left"):
-        archive.import_release(published.zip(), manifest)
-    assert archive.cache_file().read_bytes() == before
-    assert os.listdir(archive.cache_folder()) == [archive.CACHE_FILE]
+        recorded_cache.import_release(published.zip(), manifest)
+    assert recorded_cache.cache_file().read_bytes() == before
+    assert os.listdir(recorded_cache.cache_folder()) == [recorded_cache.CACHE_FILE]
 
 
 def test_unknown_sources_are_answered_with_the_known():
@@ -97,11 +97,11 @@ def test_unknown_sources_are_answered_with_the_known():
 
 
 def test_the_authors_release_is_imported_whole(release: Path):
-    imported = archive.import_release(release)
+    imported = recorded_cache.import_release(release)
     assert len(imported) == 575
     source = sources.open_source("real")
     assert source.names == tuple(sorted(source.names))
     assert source.stratum("09_nr_16").subject == "09"
-    assert same(imported, archive.load_reaches())
+    assert same(imported, recorded_cache.load_reaches())
     assert 0.84 < min(reach.duration for reach in imported) < max(reach.duration for reach in imported) < 2.19
     assert all(np.all(np.diff(reach.times) > 0) and 0 < reach.reached < reach.duration for reach in imported)

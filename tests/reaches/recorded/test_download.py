@@ -9,8 +9,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
-from dextron_bench.reaches.recorded import cache as archive
-from dextron_bench.reaches.recorded import download, release
+from dextron_bench.reaches.recorded import cache, download, release
 from tests.conftest import Published
 
 
@@ -47,7 +46,7 @@ def test_fetch_imports_what_it_downloads(published: Published, site: str):
     heard: list[tuple[int, int]] = []
     manifest = release.Manifest.load(published.manifest)
     fetched = download.fetch(manifest, lambda done, total: heard.append((done, total)), url=f"{site}/release.zip")
-    assert len(fetched) == 3 == len(archive.load_reaches(manifest))
+    assert len(fetched) == 3 == len(cache.load_reaches(manifest))
     assert heard[-1] == (len(Server.content), len(Server.content))
 
 

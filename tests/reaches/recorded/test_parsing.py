@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dextron_bench.reaches.recorded import parsing as raw
+from dextron_bench.reaches.recorded import parsing
 from tests.conftest import START, Published
 
 FILE, NOTES = "extracts/01_fl_06.json", "extracts/meta/01_fl_06_meta.json"
@@ -30,7 +30,7 @@ def line(t: Any = 1.0, x: Any = (0.0, 0.0, 0.0), q: Any = (1.0, 0.0, 0.0, 0.0)) 
 
 
 def test_parse_zeroes_the_clock_and_lifts_to_the_table(published: Published):
-    reach = raw.parse("01_fl_06", published.files[FILE], published.files[NOTES])
+    reach = parsing.parse("01_fl_06", published.files[FILE], published.files[NOTES])
     np.testing.assert_allclose(reach.times, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5], atol=1e-12)
     np.testing.assert_allclose(reach.positions[0], [-0.5, -0.2, 0.1])  # -0.1 m above a plane 0.2 m up.
     assert reach.reached == pytest.approx(0.3)
@@ -39,12 +39,12 @@ def test_parse_zeroes_the_clock_and_lifts_to_the_table(published: Published):
 
 def test_reached_counts_from_the_first_sample_not_from_the_start_annotation(published: Published):
     notes = json.dumps([["start", START - 0.2], ["reached", START + 0.4], ["top", START + 0.5]]).encode()
-    assert raw.parse("01_fl_06", published.files[FILE], notes).reached == pytest.approx(0.4)
+    assert parsing.parse("01_fl_06", published.files[FILE], notes).reached == pytest.approx(0.4)
 
 
 def test_a_sample_sent_twice_is_one(published: Published):
     lines = published.files[FILE].splitlines(keepends=True)
-    reach = raw.parse("01_fl_06", b"".join([*lines[:2], lines[1], *lines[2:]]), published.files[NOTES])
+    reach = parsing.parse("01_fl_06", b"".join([*lines[:2], lines[1], *lines[2:]]), published.files[NOTES])
     assert len(reach.times) == 6
 
 
@@ -52,13 +52,13 @@ def test_a_sample_sent_twice_is_one(published: Published):
     ("name", "origin"), [("01_fl_01", ("01", 0, 0)), ("09_nr_04", ("09", 0, 3)), ("02_fr_13", ("02", 3, 0))]
 )
 def test_markers_run_along_angles_within_a_ring(name: str, origin: tuple[str, int, int]):
-    assert raw.origin(name) == origin
+    assert parsing.origin(name) == origin
 
 
 @pytest.mark.parametrize("name", ["01_fl_17", "01_fl_00", "1_fl_01", "01_xx_01", "../01_fl_01", ""])
 def test_other_names_are_refused(name: str):
-    with pytest.raises(raw.RawError, match="SUBJECT_TRIAL_MARKER"):
-        raw.origin(name)
+    with pytest.raises(parsing.RawError, match="SUBJECT_TRIAL_MARKER"):
+        parsing.origin(name)
 
 
 @pytest.mark.parametrize(
@@ -80,20 +80,20 @@ def test_other_names_are_refused(name: str):
     ],
 )
 def test_a_bad_sample_is_named_by_line(second: str, wrong: str):
-    with pytest.raises(raw.RawError) as caught:
-        raw.read_samples(FILE, f"{line()}\n{second}\n{line(t=2.0)}\n".encode())
+    with pytest.raises(parsing.RawError) as caught:
+        parsing.read_samples(FILE, f"{line()}\n{second}\n{line(t=2.0)}\n".encode())
     assert str(caught.value).startswith(f"{FILE}: line 2: ")
     assert wrong in str(caught.value)
 
 
 def test_bytes_that_are_no_text_are_named_by_line():
-    with pytest.raises(raw.RawError, match="line 2: is not UTF-8"):
-        raw.read_samples(FILE, line().encode() + b"\n\xff\xfe\n")
+    with pytest.raises(parsing.RawError, match="line 2: is not UTF-8"):
+        parsing.read_samples(FILE, line().encode() + b"\n\xff\xfe\n")
 
 
 def test_an_empty_file_is_an_error():
-    with pytest.raises(raw.RawError, match="line 1: the file is empty"):
-        raw.read_samples(FILE, b"")
+    with pytest.raises(parsing.RawError, match="line 1: the file is empty"):
+        parsing.read_samples(FILE, b"")
 
 
 @pytest.mark.parametrize(
@@ -107,32 +107,32 @@ def test_an_empty_file_is_an_error():
     ],
 )
 def test_bad_annotations_are_named(notes: Any, wrong: str):
-    with pytest.raises(raw.RawError, match=f"{NOTES}: line 1: .*{wrong}"):
-        raw.read_annotations(NOTES, json.dumps(notes).encode())
+    with pytest.raises(parsing.RawError, match=f"{NOTES}: line 1: .*{wrong}"):
+        parsing.read_annotations(NOTES, json.dumps(notes).encode())
 
 
 def test_a_later_rest_may_be_there_twice():
     notes = json.dumps([*GOOD, ["rest", 3.0], ["rest", 4.0]]).encode()
-    assert raw.read_annotations(NOTES, notes)["reached"] == 1.0
+    assert parsing.read_annotations(NOTES, notes)["reached"] == 1.0
 
 
 def test_reached_outside_the_recording_is_an_error(published: Published):
     notes = json.dumps([["start", START], ["reached", START + 0.6], ["top", START + 0.7]]).encode()
-    with pytest.raises(raw.RawError, match=r"'reached' is outside the recording, 0\.600 s"):
-        raw.parse("01_fl_06", published.files[FILE], notes)
+    with pytest.raises(parsing.RawError, match=r"'reached' is outside the recording, 0\.600 s"):
+        parsing.parse("01_fl_06", published.files[FILE], notes)
 
 
 def test_too_few_samples_are_an_error(published: Published):
     three = b"".join(published.files[FILE].splitlines(keepends=True)[:3])
-    with pytest.raises(raw.RawError, match="has 3 samples"):
-        raw.parse("01_fl_06", three, published.files[NOTES])
+    with pytest.raises(parsing.RawError, match="has 3 samples"):
+        parsing.parse("01_fl_06", three, published.files[NOTES])
 
 
 @given(st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 4), min_size=1, max_size=20))
 def test_numbers_come_back_exactly(rows: list[tuple[float, float, float, float]]):
     rows = sorted(rows)
     text = "\n".join(line(t=t, x=x) for t, *x in rows)
-    np.testing.assert_array_equal(raw.read_samples(FILE, text.encode())[:, :4], rows)
+    np.testing.assert_array_equal(parsing.read_samples(FILE, text.encode())[:, :4], rows)
 
 
 @given(st.lists(json_values.map(json.dumps) | st.text(max_size=20), max_size=4).map("\n".join))
@@ -150,7 +150,7 @@ def test_a_damaged_file_is_refused_or_sound(place: int, put: bytes, dropped: int
 def assert_refused_or_sound(content: bytes) -> None:
     table = None
     with suppressed_at(f"{FILE}: line "):
-        table = raw.read_samples(FILE, content)
+        table = parsing.read_samples(FILE, content)
     if table is None:
         return
     assert table.shape[1] == 8
@@ -162,8 +162,8 @@ def assert_refused_or_sound(content: bytes) -> None:
 def test_any_annotations_are_refused_or_sound(text: str):
     found = None
     with suppressed_at(f"{NOTES}: line 1: "):
-        found = raw.read_annotations(NOTES, text.encode())
-    assert found is None or set(raw.ANNOTATIONS) <= set(found)
+        found = parsing.read_annotations(NOTES, text.encode())
+    assert found is None or set(parsing.ANNOTATIONS) <= set(found)
 
 
 @contextmanager
@@ -171,6 +171,6 @@ def suppressed_at(place: str) -> Iterator[None]:
     """Lets a RawError pass that begins with a place; any other error is a failure."""
     try:
         yield
-    except raw.RawError as error:
+    except parsing.RawError as error:
         if not str(error).startswith(place):
             raise

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.reaches.recorded import cache as archive
+from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.recorded.release import MAX_FILE, Manifest, ReleaseError
 from dextron_bench.reaches.recorded.release import read as read_release
 from tests.conftest import NAMES, Published
@@ -50,8 +50,8 @@ def test_a_zip_may_have_any_top(published: Published, top: str):
 
 def refused(where: Path, published: Published) -> str:
     with pytest.raises(ReleaseError) as caught:
-        archive.import_release(where, Manifest.load(published.manifest))
-    assert not archive.cache_file().exists()
+        recorded_cache.import_release(where, Manifest.load(published.manifest))
+    assert not recorded_cache.cache_file().exists()
     return str(caught.value)
 
 
@@ -92,9 +92,9 @@ def test_members_outside_the_release_are_never_read_or_written(published: Publis
     with zipfile.ZipFile(where, "a") as made:
         for name, content in evil.items():
             made.writestr(name, content)
-    archive.import_release(where, Manifest.load(published.manifest))
+    recorded_cache.import_release(where, Manifest.load(published.manifest))
     assert {file.name for file in tmp_path.rglob("*") if file.is_file()} == {
-        *("release.zip", "manifest.json", archive.CACHE_FILE)
+        *("release.zip", "manifest.json", recorded_cache.CACHE_FILE)
     }
 
 

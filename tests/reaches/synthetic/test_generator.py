@@ -17,8 +17,7 @@ from dextron_bench.reaches import rotation
 from dextron_bench.reaches.reach import CONTROL_STEP, SETTLE, Reach, palm_centre, path
 from dextron_bench.reaches.setting import Stratum, UnknownReach
 from dextron_bench.reaches.sources import open_source
-from dextron_bench.reaches.synthetic import fitting as synthetic_fit
-from dextron_bench.reaches.synthetic import generator as synthetic
+from dextron_bench.reaches.synthetic import fitting, generator
 from dextron_bench.reaches.synthetic.encoding import encode, log_stretches
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -30,19 +29,19 @@ SAMPLES, REACHED = 166, 0.989021713  # [s]
 
 
 @pytest.fixture(scope="module")
-def source() -> synthetic.SyntheticSource:
-    return synthetic.open_synthetic()
+def source() -> generator.SyntheticSource:
+    return generator.open_synthetic()
 
 
 @pytest.fixture(scope="module")
 def few() -> list[Reach]:
     """Made-up recordings: a session of each of two subjects, with every start region."""
     numbers = [*range(16), *range(4 * 16, 5 * 16)]
-    reaches = [synthetic.generate(number, synthetic.shipped()) for number in numbers]
+    reaches = [generator.generate(number, generator.shipped()) for number in numbers]
     return [replace(r, name=f"{r.subject}_{i // 16}_{i % 16}") for i, r in enumerate(reaches)]
 
 
-def test_there_are_100_reaches_for_each_start_region(source: synthetic.SyntheticSource):
+def test_there_are_100_reaches_for_each_start_region(source: generator.SyntheticSource):
     assert (source.names[0], source.names[-1]) == ("synthetic-0000", "synthetic-1599")
     strata = [source.stratum(name) for name in source.names]
     assert set(Counter((s.ring, s.angle) for s in strata).values()) == {100}
@@ -57,27 +56,27 @@ def test_opening_makes_no_reach():
     assert time.process_time() - began < 0.05
 
 
-def test_a_stratum_is_that_of_the_reach(source: synthetic.SyntheticSource):
+def test_a_stratum_is_that_of_the_reach(source: generator.SyntheticSource):
     for name in source.names[5::333]:
         reach = source.reach(name)
         assert (reach.name, source.stratum(name)) == (name, Stratum(reach.subject, reach.ring, reach.angle))
 
 
-def test_a_reach_depends_on_its_number_alone(source: synthetic.SyntheticSource):
-    first, alone = source.reach("synthetic-0700"), synthetic.generate(700, synthetic.shipped())
+def test_a_reach_depends_on_its_number_alone(source: generator.SyntheticSource):
+    first, alone = source.reach("synthetic-0700"), generator.generate(700, generator.shipped())
     np.testing.assert_array_equal(first.positions, alone.positions)
     np.testing.assert_array_equal(first.quaternions, alone.quaternions)
     assert not np.array_equal(first.positions[:50], source.reach("synthetic-0716").positions[:50])
 
 
-def test_the_shipped_reaches_are_frozen(source: synthetic.SyntheticSource):
+def test_the_shipped_reaches_are_frozen(source: generator.SyntheticSource):
     reach = source.reach("synthetic-0042")
     np.testing.assert_allclose(reach.positions[0], FIRST, atol=2e-9)
     np.testing.assert_allclose(reach.quaternions[-1], LAST, atol=2e-9)
     assert (len(reach.times), reach.reached) == (SAMPLES, pytest.approx(REACHED, abs=2e-9))
 
 
-def test_reaches_are_sound(source: synthetic.SyntheticSource):
+def test_reaches_are_sound(source: generator.SyntheticSource):
     for name in source.names[::40]:
         reach = source.reach(name)
         np.testing.assert_allclose(np.diff(reach.times), 0.01, atol=1e-9)
@@ -92,7 +91,7 @@ def test_reaches_are_sound(source: synthetic.SyntheticSource):
 @settings(max_examples=15, deadline=None)
 @given(number=st.integers(0, 1599), noise=st.floats(-2.0, 3.0), x=st.floats(-0.06, 0.06))
 def test_every_path_passes_the_bottle_with_its_offset(number: int, noise: float, x: float):
-    reach = synthetic.generate(number, synthetic.shipped())
+    reach = generator.generate(number, generator.shipped())
     if 2.5 * reach.duration + 0.5 + 0.8 * noise < reach.duration:
         return
     made = path(reach, x, 0.01, noise)
@@ -102,7 +101,7 @@ def test_every_path_passes_the_bottle_with_its_offset(number: int, noise: float,
     np.testing.assert_allclose(palm_centre(*pose)[:2], [x, 0.01], atol=1e-7)
 
 
-def test_an_unknown_name_is_answered_with_known_ones(source: synthetic.SyntheticSource):
+def test_an_unknown_name_is_answered_with_known_ones(source: generator.SyntheticSource):
     with pytest.raises(UnknownReach, match="synthetic-0000"):
         source.reach("synthetic-1600")
     with pytest.raises(UnknownReach, match="synthetic-0000"):
@@ -111,32 +110,32 @@ def test_an_unknown_name_is_answered_with_known_ones(source: synthetic.Synthetic
 
 def test_values_are_mapped_between_quantiles():
     source, target = np.array([0.0, 1.0, 3.0]), np.array([[10.0, 20.0, 60.0]] * 4)
-    np.testing.assert_allclose(synthetic.mapped(np.array([0.5, 2.0, -9.0, 9.0]), source, target), [15, 40, 10, 60])
+    np.testing.assert_allclose(generator.mapped(np.array([0.5, 2.0, -9.0, 9.0]), source, target), [15, 40, 10, 60])
 
 
 def test_steps_take_their_sizes_and_keep_their_way():
     steps = np.zeros((2, 2, 3))
     steps[:, 0, 0], steps[:, 1, 1] = (1.0, 3.0), (1.0, 1.0)
     sizes = np.array([[[2.0], [3.0]], [[2.0], [0.5]]])
-    made = synthetic.resized(steps, sizes)
+    made = generator.resized(steps, sizes)
     np.testing.assert_allclose(made[:, 0, 0], [2.0, 2.0])
     np.testing.assert_allclose(made[:, 1, 1], [3.0, 0.5])
 
 
 def test_noise_is_filtered_latest_first():
-    np.testing.assert_allclose(synthetic.echoed(np.array([1.0, 0.0, 0.0, 2.0]), np.array([1.0, 0.5])), [0.5, 0.0, 2.0])
+    np.testing.assert_allclose(generator.echoed(np.array([1.0, 0.0, 0.0, 2.0]), np.array([1.0, 0.5])), [0.5, 0.0, 2.0])
 
 
 def test_taps_of_a_first_order_process():
-    taps = synthetic_fit.impulse_response(np.array([1.0, 0.5]))
+    taps = fitting.impulse_response(np.array([1.0, 0.5]))
     np.testing.assert_allclose(taps[:3], np.sqrt(0.75) * np.array([1.0, 0.5, 0.25]))
 
 
-def test_stretches_add_up_to_the_duration(source: synthetic.SyntheticSource):
+def test_stretches_add_up_to_the_duration(source: generator.SyntheticSource):
     reach = source.reach("synthetic-0003")
     stretches = np.exp(log_stretches(reach))
     assert stretches.sum() == pytest.approx(reach.duration)
-    assert stretches[: synthetic.ARRIVED].sum() == pytest.approx(reach.reached)
+    assert stretches[: generator.ARRIVED].sum() == pytest.approx(reach.reached)
 
 
 def test_lags_of_the_sensor_are_found():
@@ -152,11 +151,11 @@ def test_lags_of_the_sensor_are_found():
 
 def test_equal_recordings_give_equal_bytes(few: list[Reach], tmp_path: Path):
     first, second = tmp_path / "first.npz", tmp_path / "second.npz"
-    model = synthetic_fit.fit(few, 0)
-    synthetic_fit.save(model, first)
-    synthetic_fit.save(synthetic_fit.fit(few, 0), second)
+    model = fitting.fit(few, 0)
+    fitting.save(model, first)
+    fitting.save(fitting.fit(few, 0), second)
     assert first.read_bytes() == second.read_bytes()
-    loaded = synthetic.load(str(first))
+    loaded = generator.load(str(first))
     for field in fields(model):
         np.testing.assert_array_equal(getattr(loaded, field.name), getattr(model, field.name))
 

@@ -14,11 +14,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench.cli import main as cli
+from dextron_bench.cli import main
 from dextron_bench.cli.data_synthetic import compared, print_likeness
 from dextron_bench.reaches.reach import Reach
-from dextron_bench.reaches.recorded import cache as archive
-from dextron_bench.reaches.synthetic import two_sample as likeness
+from dextron_bench.reaches.recorded import cache as recorded_cache
+from dextron_bench.reaches.synthetic import two_sample
 from dextron_bench.reaches.synthetic.generator import generate, load, shipped
 from dextron_bench.reaches.synthetic.two_sample_features import GROUPS, alone, features, measures, nearest, summaries
 
@@ -46,8 +46,8 @@ def reaches() -> list[Reach]:
 
 @pytest.fixture
 def few_trees(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(likeness, "TREES", 30)
-    monkeypatch.setattr(likeness, "REPEATS", 50)
+    monkeypatch.setattr(two_sample, "TREES", 30)
+    monkeypatch.setattr(two_sample, "REPEATS", 50)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_features_have_one_finite_row_a_reach(reaches: list[Reach]):
 
 
 def test_equal_samples_cannot_be_told_apart(reaches: list[Reach], few_trees: None):
-    table = likeness.report(reaches[:48], reaches[48:], 0)
+    table = two_sample.report(reaches[:48], reaches[48:], 0)
     whole = table[table.stratum == "all"]
     assert sorted(whole.group.unique()) == sorted([*GROUPS, "everything"])
     assert whole.auc.mean() == pytest.approx(0.5, abs=0.1)
@@ -87,33 +87,33 @@ def test_equal_samples_cannot_be_told_apart(reaches: list[Reach], few_trees: Non
 
 def test_a_difference_is_found_where_it_is(reaches: list[Reach], few_trees: None):
     slower = [replace(r, times=r.times * 1.5, reached=r.reached * 1.5) for r in reaches[48:]]
-    table = likeness.report(reaches[:48], slower, 0).set_index(["group", "classifier", "stratum"]).auc
+    table = two_sample.report(reaches[:48], slower, 0).set_index(["group", "classifier", "stratum"]).auc
     assert table["durations", "forest", "all"] > 0.9
     assert table["durations", "logistic", "ring 2"] > 0.8
     assert table["orientations", "forest", "all"] < 0.65
 
 
 def test_strata_cover_rings_angles_and_regions(reaches: list[Reach]):
-    named = dict(likeness.strata(reaches))
+    named = dict(two_sample.strata(reaches))
     assert len(named) == 1 + 4 + 4 + 16
     assert (named["all"].sum(), named["ring 3"].sum(), named["angle 0"].sum(), named["2-1"].sum()) == (96, 24, 24, 6)
 
 
 def test_auc_by_hand():
-    found = likeness.auc_interval(np.array([0.1, 0.4]), np.array([0.3, 0.4]), np.random.default_rng(0))
+    found = two_sample.auc_interval(np.array([0.1, 0.4]), np.array([0.3, 0.4]), np.random.default_rng(0))
     assert found["auc"] == (1 + 1 + 0 + 0.5) / 4
     assert 0.0 <= found["low"] <= found["auc"] <= found["high"] <= 1.0
-    assert np.isnan(likeness.auc_interval(np.zeros(0), np.ones(3), np.random.default_rng(0))["auc"])
+    assert np.isnan(two_sample.auc_interval(np.zeros(0), np.ones(3), np.random.default_rng(0))["auc"])
 
 
 def test_folds_spread_every_label():
     labels = np.repeat([0, 1, 2], 10)
-    fold = likeness.folds(labels, 5, np.random.default_rng(0))
+    fold = two_sample.folds(labels, 5, np.random.default_rng(0))
     assert all((np.bincount(fold[labels == label]) == 2).all() for label in range(3))
 
 
 def test_a_persons_reaches_from_a_region_are_judged_together(reaches: list[Reach]):
-    fold = likeness.cell_folds(reaches[:48], reaches[48:], np.random.default_rng(0))
+    fold = two_sample.cell_folds(reaches[:48], reaches[48:], np.random.default_rng(0))
     np.testing.assert_array_equal(fold[:48], fold[48:])  # The second half repeats the cells of the first.
     assert set(np.bincount(fold) > 10) == {True}
 
@@ -126,18 +126,18 @@ def test_held_out_reaches_come_from_models_without_them(reaches: list[Reach], mo
         fitted.append({r.name for r in some})
         return shipped()
 
-    monkeypatch.setattr(likeness, "fit", spy)
-    made = likeness.held_out(recorded, 0)
+    monkeypatch.setattr(two_sample, "fit", spy)
+    made = two_sample.held_out(recorded, 0)
     everyone = {r.name for r in recorded}
     assert len(made) == 2 * len(recorded)
     assert sorted(name for names in fitted for name in everyone - names) == sorted(everyone)
 
 
 def test_held_out_subjects_are_strangers(reaches: list[Reach], monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(likeness, "fit", lambda some, seed: shipped())
+    monkeypatch.setattr(two_sample, "fit", lambda some, seed: shipped())
     recorded = [replace(r, subject=f"p{i % 4}") for i, r in enumerate(reaches[:16])]
     away: list[str] = []
-    for strangers, made, others in likeness.held_out_subjects(recorded, 0):
+    for strangers, made, others in two_sample.held_out_subjects(recorded, 0):
         assert not {r.subject for r in strangers} & {r.subject for r in others}
         assert len(made) == len(others)
         away += {r.subject for r in strangers}
@@ -156,11 +156,11 @@ def test_without_scikit_learn_the_user_is_told_what_to_do(
     reaches: list[Reach], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.setitem(sys.modules, "sklearn.ensemble", None)
-    with pytest.raises(likeness.MissingClassifiers, match="pip install scikit-learn"):
-        likeness.report(reaches[:4], reaches[4:8], 0)
-    monkeypatch.setattr(archive, "load_reaches", lambda: reaches[:4])
-    monkeypatch.setattr(likeness, "fit", None)
-    assert cli.main(["data", "likeness"]) == 2
+    with pytest.raises(two_sample.MissingClassifiers, match="pip install scikit-learn"):
+        two_sample.report(reaches[:4], reaches[4:8], 0)
+    monkeypatch.setattr(recorded_cache, "load_reaches", lambda: reaches[:4])
+    monkeypatch.setattr(two_sample, "fit", None)
+    assert main.main(["data", "likeness"]) == 2
     printed = capsys.readouterr()
     assert (printed.out, printed.err.count("\n")) == ("", 1)
     assert "pip install scikit-learn" in printed.err
@@ -173,11 +173,11 @@ def test_without_recordings_the_user_is_told_how_to_get_them(
     monkeypatch.delenv("DEXTRON_DATA", raising=False)
     monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["data", verb]) == 2
+    assert main.main(["data", verb]) == 2
     printed = capsys.readouterr()
     assert (printed.out, printed.err.count("\n")) == ("", 1)
     assert "data import --from" in printed.err
-    assert cli.main(["data", verb, "--seed", "-1"]) == 2
+    assert main.main(["data", verb, "--seed", "-1"]) == 2
     assert "a seed is 0 or more" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dextron_bench.recording import stills as pictures
+from dextron_bench.recording import stills
 from dextron_bench.world import model
-from dextron_bench.world.rendering import renderer as appearance
-from dextron_bench.world.rendering import visuals as dressing
+from dextron_bench.world.rendering import renderer, visuals
 from dextron_bench.world.rendering.meshes import Section, loft
 
 SIZES = ["nq", "nv", "nu", "nbody", "njnt", "neq", "nmocap", "qpos0"]
@@ -36,7 +35,7 @@ def orange(picture: np.ndarray) -> int:
 
 @pytest.mark.parametrize("name", SIZES + BODIES + JOINTS + ACTUATORS)
 def test_dressing_keeps_every_quantity_of_the_physics(name: str) -> None:
-    np.testing.assert_array_equal(getattr(dressing.dressed(), name), getattr(model.load(), name))
+    np.testing.assert_array_equal(getattr(visuals.visual_model(), name), getattr(model.load(), name))
 
 
 def test_only_the_physics_own_shapes_can_touch() -> None:
@@ -44,12 +43,12 @@ def test_only_the_physics_own_shapes_can_touch() -> None:
         able = np.flatnonzero(compiled.geom_contype | compiled.geom_conaffinity)
         return [compiled.geom(geom).name for geom in able]
 
-    assert touchable(dressing.dressed()) == touchable(model.load())
+    assert touchable(visuals.visual_model()) == touchable(model.load())
 
 
 def test_the_dressed_model_moves_like_the_physics() -> None:
     ends = []
-    for compiled in (model.load(), dressing.dressed()):
+    for compiled in (model.load(), visuals.visual_model()):
         data = mujoco.MjData(compiled)
         data.qpos[:] = model.half_closed()
         data.mocap_pos[0] = data.qpos[model.PALM_POSITION]
@@ -62,7 +61,7 @@ def test_the_dressed_model_moves_like_the_physics() -> None:
 def test_a_picture_shows_the_bottle_where_it_stands(start: np.ndarray) -> None:
     away = start.copy()
     away[model.BOTTLE_POSITION] = 9.0
-    both = appearance.frames(np.stack([start, away]), 160, 120)
+    both = renderer.frames(np.stack([start, away]), 160, 120)
     assert both.shape == (2, 120, 160, 3)
     assert both.dtype == np.uint8
     assert orange(both[0]) > 60
@@ -70,21 +69,21 @@ def test_a_picture_shows_the_bottle_where_it_stands(start: np.ndarray) -> None:
 
 
 def test_the_sky_is_up(start: np.ndarray) -> None:
-    picture = appearance.render(start, 80, 60).astype(int)
+    picture = renderer.render(start, 80, 60).astype(int)
     assert picture[:5].mean() > picture[-5:].mean() + 20
 
 
 def test_a_picture_is_of_its_state_alone(start: np.ndarray) -> None:
     lifted = start.copy()
     lifted[2] += 0.2
-    once = appearance.frames(np.stack([lifted, start, lifted]), 80, 60)
+    once = renderer.frames(np.stack([lifted, start, lifted]), 80, 60)
     np.testing.assert_array_equal(once[0], once[2])
     assert (once[0] != once[1]).any()
 
 
 @pytest.mark.slow
 def test_more_lamps_soften_shadows(start: np.ndarray) -> None:
-    hard, soft = (appearance.render(start, 160, 120, "top", lamps).astype(int) for lamps in (1, 6))
+    hard, soft = (renderer.render(start, 160, 120, "top", lamps).astype(int) for lamps in (1, 6))
     steps = [np.abs(np.diff(picture.sum(axis=2), axis=0)).max() for picture in (hard, soft)]
     assert (hard != soft).any()
     assert steps[1] <= steps[0]
@@ -92,19 +91,19 @@ def test_more_lamps_soften_shadows(start: np.ndarray) -> None:
 
 def test_unknown_cameras_name_the_known(start: np.ndarray) -> None:
     with pytest.raises(
-        appearance.UnknownCamera, match="no camera 'left'; choose from behind, front, hand, hero, side, top"
+        renderer.UnknownCamera, match="no camera 'left'; choose from behind, front, hand, hero, side, top"
     ):
-        appearance.render(start, camera="left")
+        renderer.render(start, camera="left")
 
 
 def test_without_graphics_the_error_says_what_to_install(start: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MUJOCO_GL", raising=False)
-    monkeypatch.setattr(appearance, "find_library", lambda name: None)
-    with pytest.raises(appearance.NoGraphics, match=r"libegl1 .*libosmesa6"):
-        appearance.render(start)
+    monkeypatch.setattr(renderer, "find_library", lambda name: None)
+    with pytest.raises(renderer.NoGraphics, match=r"libegl1 .*libosmesa6"):
+        renderer.render(start)
     monkeypatch.setenv("MUJOCO_GL", "disabled")
-    with pytest.raises(appearance.NoGraphics, match="MUJOCO_GL='disabled'"):
-        appearance.render(start)
+    with pytest.raises(renderer.NoGraphics, match="MUJOCO_GL='disabled'"):
+        renderer.render(start)
 
 
 @pytest.mark.parametrize("domes", [(0.0, 0.0), (0.01, 0.02)])
@@ -123,18 +122,18 @@ def test_a_shell_of_equal_circles_holds_the_volume_of_its_prism() -> None:
 
 
 def test_the_pictured_grasp_succeeds() -> None:
-    assert pictures.lift().success
+    assert stills.lift().success
 
 
 def test_a_pictured_hand_is_as_closed_as_told(start: np.ndarray) -> None:
     joints, closed = model.proximal()
-    np.testing.assert_allclose(pictures.hand(start, 0.25)[joints], closed / 4)
-    np.testing.assert_array_equal(pictures.hand(start, model.HALF_CLOSED)[14:], start[14:])
+    np.testing.assert_allclose(stills.hand(start, 0.25)[joints], closed / 4)
+    np.testing.assert_array_equal(stills.hand(start, model.HALF_CLOSED)[14:], start[14:])
 
 
 @pytest.mark.slow
 def test_pictures_are_written_small_and_wide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pictures, "LAMPS", 1)
-    sizes = {file.name: Image.open(file).size for file in pictures.write_pictures(tmp_path)}
+    monkeypatch.setattr(stills, "LAMPS", 1)
+    sizes = {file.name: Image.open(file).size for file in stills.write_pictures(tmp_path)}
     assert sizes == {"hero.png": (1280, 720), "hand-open-half-closed.png": (1278, 320)}
     assert all(file.stat().st_size < 400_000 for file in tmp_path.iterdir())

@@ -1,0 +1,86 @@
+"""What a submission enters: an agent under a name, with its seeds and settings."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dextron_bench.leaderboard.submission.declaration import Declaration
+from dextron_bench.methods import registry
+from dextron_bench.methods.isolation.launch import Launch, launch
+from dextron_bench.world import model
+
+FOLDER = "submissions"  # In the folder of runs.
+
+
+class BadSubmission(ValueError):
+    """What cannot be submitted; the message says what would be right."""
+
+
+def settle(spec: str, text: str, reaches: str) -> dict[str, Any]:
+    """An agent's settings from JSON; of an installed method all, as it is made for a source of reaches.
+
+    Raises BadSubmission, BadSettings.
+    """
+    found = _read(text)
+    return registry.settings(registry.create(spec, found, reaches)) if spec in registry.known() else found
+
+
+def _read(text: str) -> dict[str, Any]:
+    try:
+        found = json.loads(text)
+    except ValueError as error:
+        raise BadSubmission(f"--settings is no JSON ({error})") from error
+    if not isinstance(found, dict):
+        raise BadSubmission("settings are a JSON object, like '{\"near\": 0.05}'")
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What is submitted: an agent by the words that name it, on a source of reaches, with seeds."""
+
+    name: str
+    spec: str
+    reaches: str
+    seeds: tuple[int, ...]
+    settings: dict[str, Any] = field(default_factory=dict)
+    weights: Path | None = None
+    declared: Declaration = field(default_factory=Declaration)
+
+    def __post_init__(self) -> None:
+        if self.name.casefold().split("-")[0] in registry.known():
+            raise BadSubmission(f"the name {self.name!r} begins like that of an installed method; choose another")
+        if sorted(self.seeds) != list(range(len(self.seeds))):
+            raise BadSubmission("seeds are 0, 1, 2 and so on, so that nobody chooses the best: --seed 0 1 2")
+        if not registry.NAME.fullmatch(self.name) or len(self.name) > 64:
+            raise BadSubmission(
+                f"the name {self.name!r} is not one: use up to 64 letters, digits and . _ + -, as in 'my-agent'"
+            )
+
+    @property
+    def launch(self) -> Launch:
+        """What starts the agent's process."""
+        return launch(self.spec, self.settings, self.weights)
+
+    def folder(self, runs: Path) -> Path:
+        """Where the runs of its seeds lie."""
+        return runs / FOLDER / self.name / self.reaches
+
+    def told(self) -> dict[str, Any]:
+        """What its manifest says of it."""
+        how = self.launch
+        spec = self.spec if how.kind == "method" or how.command else f"{Path(how.spec).name}"
+        agent = {"kind": how.kind or "exec", "spec": spec, "settings": self.settings}
+        agent["weights"] = self.weights.name if self.weights else ""
+        told = {"name": self.name, "reaches": self.reaches, "seeds": list(self.seeds), "agent": agent}
+        return {**told, "declared": asdict(self.declared), "physics": model.mjcf_hash()}
+
+    def files(self) -> dict[str, Path]:
+        """The agent's own files, that it can be run again from, by name."""
+        place, _, _ = self.launch.spec.rpartition(":")
+        code = [Path(place)] if self.launch.kind == "code" and place.endswith(".py") else []
+        policy = [Path(self.launch.spec)] if self.launch.kind == "policy" else []
+        return {file.name: file for file in (*code, *policy, *([self.weights] if self.weights else []))}

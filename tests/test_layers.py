@@ -1,0 +1,109 @@
+"""The table of layers, import by import: a package imports only packages of the levels below it."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+LEVELS = {
+    "storage": 1,
+    "reaches": 1,
+    "world": 2,
+    "experts": 3,
+    "splits": 4,
+    "methods": 4,
+    "evaluation": 5,
+    "recording": 6,
+    "success": 6,
+    "training": 6,
+    "runs": 7,
+    "scores": 7,
+    "baselines": 7,
+    "leaderboard": 8,
+    "cli": 9,
+}
+SDKS = {  # Packages of others that one place alone imports.
+    "rerun": "dextron_bench/recording/",
+    "rerun_bindings": "dextron_bench/recording/",
+    "matplotlib": "dextron_bench/scores/figures.py",
+    "minari": "dextron_bench/evaluation/minari_export.py",
+    "av": "dextron_bench/recording/film.py",
+    "tyro": "dextron_bench/cli/",
+    "rich": "dextron_bench/cli/",
+}
+TOP = ("dextron_bench/__init__.py", "dextron_bench/__main__.py")  # Above all levels.
+FILES = sorted(file for folder in ("dextron_bench", "baselines") for file in (ROOT / folder).rglob("*.py"))
+
+
+def imports(file: Path) -> Iterator[str]:
+    """Dotted names of the modules that a file imports anywhere, and of the names that it imports from them."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file} has a relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def package(name: str) -> str:
+    """The package of the table that a dotted name belongs to; empty for other names."""
+    first, _, rest = name.partition(".")
+    if first == "baselines":
+        return first
+    return rest.partition(".")[0] if first == "dextron_bench" else ""
+
+
+def faults(file: str, names: Iterator[str] | list[str]) -> list[str]:
+    """Imports of a file that go up or sideways, or reach a package of others that has another home."""
+    here, found = package(file.removesuffix(".py").replace("/", ".")), []
+    for name in names:
+        there = package(name)
+        if there in LEVELS and file not in TOP and here != there and LEVELS[there] >= LEVELS[here]:
+            found.append(f"{file} imports {name}: {here} is level {LEVELS[here]}, {there} is level {LEVELS[there]}")
+        if name == f"dextron_bench.{here}" or (name.rpartition(".")[0] == f"dextron_bench.{here}" and _of_init(name)):
+            found.append(f"{file} imports its own package's __init__.py")
+        home = SDKS.get(name.partition(".")[0])
+        if home and not file.startswith(home):
+            found.append(f"{file} imports {name}, whose home is {home}")
+    return found
+
+
+def _of_init(name: str) -> bool:
+    """True if a dotted name is no module: then the package's `__init__.py` offers it."""
+    place = ROOT / name.replace(".", "/")
+    return not place.is_dir() and not place.with_suffix(".py").exists()
+
+
+@pytest.mark.parametrize("file", [str(file.relative_to(ROOT)) for file in FILES])
+def test_a_package_imports_only_from_the_levels_below(file: str):
+    assert faults(file, imports(ROOT / file)) == []
+
+
+def test_every_package_has_a_level():
+    folders = {place.name for place in (ROOT / "dextron_bench").iterdir() if (place / "__init__.py").exists()}
+    assert folders == LEVELS.keys() - {"baselines"}
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "fault"),
+    [
+        (
+            "dextron_bench/world/task.py",
+            "dextron_bench.experts.policies.Expert",
+            "world is level 2, experts is level 3",
+        ),
+        ("dextron_bench/splits/loading.py", "dextron_bench.methods.registry", "splits is level 4, methods is level 4"),
+        ("dextron_bench/cli/run.py", "baselines.rl", None),
+        ("dextron_bench/runs/plans.py", "baselines.rl", "baselines is level 7"),
+        ("dextron_bench/scores/paired.py", "rerun.chunk", "whose home is dextron_bench/recording/"),
+        ("dextron_bench/recording/pair.py", "dextron_bench.recording.read", "its own package's __init__.py"),
+    ],
+)
+def test_a_fault_is_noticed(file: str, name: str, fault: str | None):
+    found = faults(file, [name])
+    assert len(found) == (fault is not None)
+    assert all(fault in line for line in found if fault)
