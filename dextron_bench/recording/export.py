@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.recording import film
+from dextron_bench.recording import film, summaries
 from dextron_bench.storage import atomic
 from dextron_bench.world import model
 
@@ -33,7 +32,7 @@ def export(source: Path, into: Path, look: film.Look, report: film.Report = lamb
     ending = into.suffix.lower()
     if ending not in (*FILMS, *TABLES):
         raise UnknownEnding(into)
-    episode = recording.read_safely(source).episode
+    episode = summaries.read_safely(source).episode
     if ending in FILMS:
         atomic.write_atomically(into, lambda part: FILMS[ending](part, episode.states, look, report))
     elif ending == ".csv":
