@@ -1,10 +1,19 @@
-"""Sources of reaches by name."""
+"""Sources of reaches by name.
+
+The command line takes its types from this module, so the module imports nothing heavy: each source is imported when it
+is opened.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
 
-from dextron_bench.reaches.setting import ReachSource, Source
+if TYPE_CHECKING:
+    from dextron_bench.reaches.setting import Source
+
+SourceName = Literal["real", "synthetic", "minjerk"]
+RankedSource = Literal["real", "synthetic"]  # The sources that take submissions; `minjerk` has one expert only.
 
 
 class UnknownSource(KeyError):
@@ -18,30 +27,35 @@ class UnknownSource(KeyError):
 
 
 def open_source(name: str) -> Source:
-    """The source of that name; raises UnknownSource, and MissingData for `real` before its import."""
+    """Returns the source of that name. Raises UnknownSource, and MissingData for `real` before its import."""
     try:
-        opens = SOURCES[name]
+        opener = SOURCES[name]
     except KeyError:
         raise UnknownSource(name) from None
-    return opens()
+    return opener()
 
 
-def _real() -> Source:
+def _open_real() -> Source:
     from dextron_bench.reaches.recorded.cache import load_reaches
+    from dextron_bench.reaches.setting import ReachSource
 
     return ReachSource("real", load_reaches())
 
 
-def _synthetic() -> Source:
+def _open_synthetic() -> Source:
     from dextron_bench.reaches.synthetic.generator import open_synthetic
 
     return open_synthetic()
 
 
-def _minjerk() -> Source:
+def _open_minjerk() -> Source:
     from dextron_bench.reaches.minjerk import MinjerkSource
 
     return MinjerkSource()
 
 
-SOURCES: dict[str, Callable[[], Source]] = {"real": _real, "synthetic": _synthetic, "minjerk": _minjerk}
+SOURCES: dict[str, Callable[[], Source]] = {
+    "real": _open_real,
+    "synthetic": _open_synthetic,
+    "minjerk": _open_minjerk,
+}

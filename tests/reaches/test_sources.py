@@ -1,0 +1,32 @@
+"""Sources by name: the types of the command line list the sources that exist, and cost nothing to import."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import get_args
+
+import pytest
+
+from dextron_bench.reaches.sources import SOURCES, RankedSource, SourceName, UnknownSource, open_source
+
+
+def test_the_types_list_the_sources_in_their_order():
+    assert get_args(SourceName) == tuple(SOURCES) == ("real", "synthetic", "minjerk")
+    assert set(get_args(RankedSource)) < set(SOURCES)
+
+
+def test_the_types_import_nothing_heavy():
+    code = "import sys, dextron_bench.reaches.sources; print({'numpy', 'pandas', 'scipy'} & sys.modules.keys())"
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert printed == "set()\n"
+
+
+@pytest.mark.parametrize("name", ["synthetic", "minjerk"])
+def test_a_source_has_the_name_that_opens_it(name: str):
+    assert open_source(name).name == name
+
+
+def test_an_unknown_name_lists_the_sources():
+    with pytest.raises(UnknownSource, match="no source of reaches 'Real'; choose from minjerk, real, synthetic"):
+        open_source("Real")
