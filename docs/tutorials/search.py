@@ -38,7 +38,7 @@ class Search:
     """The method. Its fields are flags of `dextron-bench run`."""
 
     name: ClassVar[str] = "search"
-    home: ClassVar[str] = ""  # Empty: it trains on the reaches of the run.
+    train_source: ClassVar[str] = ""  # Empty: it trains on the reaches of the run.
 
     preset: Literal["full", "smoke"] = "full"
     """How long to train."""
@@ -63,7 +63,7 @@ class Search:
         return 1
 
     @property
-    def rehearsal(self) -> Search:
+    def timing_run(self) -> Search:
         """A short training from which the harness estimates the time of a long one."""
         return replace(self, preset="smoke")
 
