@@ -1,5 +1,5 @@
 """A benchmark of grasping for a prosthetic hand that a person moves."""
 
-from dextron_bench.world.registration import register_with_gymnasium
+from dextron_bench.world.registration import register_environments
 
-register_with_gymnasium()
+register_environments()
