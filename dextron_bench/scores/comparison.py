@@ -1,14 +1,14 @@
-"""Two methods compared on the settings that both played (docs/statistics.md)."""
+"""Compares two methods on the settings that both played (docs/statistics.md)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from dextron_bench.runs.result_files import Results, _listed
+from dextron_bench.runs.result_files import Results
 from dextron_bench.scores import paired
 from dextron_bench.splits import strata
 from dextron_bench.world import task
@@ -16,12 +16,27 @@ from dextron_bench.world import task
 ALL = "all"  # The group of all settings.
 
 
+class Incomparable(ValueError):
+    """The results were not scored on the same settings."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeedScores:
+    """Scores (seeds, settings) of one method on one version of a split, given by its digest."""
+
+    name: str
+    reaches: str
+    split: str
+    digest: str
+    scores: np.ndarray
+
+
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What side B scores more than side A: `score` (of 20) and `success` (of 1), with `p_value` of McNemar's test.
+    """How much more B scores than A: `score` (of 20), `success` (of 1), and the `p_value` of McNemar's test.
 
-    `flips` has a row for each setting of another outcome: `row`, `gained` (by B), the shares of seeds that solve it,
-    `a` and `b`, and `subject`, `ring` and `angle` where the split ships. `groups` has one for ALL settings, for each
+    `flips` has a row for each setting with a different outcome: `row`, `gained` (by B), the shares of seeds that solve
+    it, `a` and `b`, and `subject`, `ring` and `angle` if the split ships. `groups` has a row for ALL settings, for each
     subject and for each start region: `group`, `rows`, mean returns `a` and `b`, `difference`, `low`, `high`.
     """
 
@@ -35,93 +50,92 @@ class Comparison:
 
 
 def compare(a: SeedScores, b: SeedScores) -> Comparison:
-    """Compares two sides that `sides.pair` made; raises DamagedSplit."""
+    """Compares two methods that `align` put on the same settings. Raises DamagedSplit."""
     rows = strata.shipped(a.reaches, a.split, a.digest)
-    solved = [side.scores == task.SUCCESS for side in (a, b)]
-    flips = paired.flips(*solved)
+    solved_a, solved_b = a.scores == task.SUCCESS, b.scores == task.SUCCESS
+    flips = paired.flips(solved_a, solved_b)
     return Comparison(
         a,
         b,
-        paired.published(a.scores, b.scores),
-        paired.published(*(each.astype(float) for each in solved)),
+        paired.published_difference(a.scores, b.scores),
+        paired.published_difference(solved_a.astype(float), solved_b.astype(float)),
         flips.p_value,
-        _flipped(flips, solved, rows),
+        _flip_table(flips, solved_a, solved_b, rows),
         pd.DataFrame(_groups(a.scores, b.scores, rows)),
     )
 
 
-def _flipped(flips: paired.Flips, solved: list[np.ndarray], rows: pd.DataFrame | None) -> pd.DataFrame:
+def _flip_table(
+    flips: paired.Flips, solved_a: np.ndarray, solved_b: np.ndarray, rows: pd.DataFrame | None
+) -> pd.DataFrame:
     changed = np.sort(np.concatenate([flips.gained, flips.lost])).astype(int)
-    a, b = (each.mean(axis=0)[changed] for each in solved)
-    found = pd.DataFrame({"row": changed, "gained": np.isin(changed, flips.gained), "a": a, "b": b})
-    return found if rows is None else found.join(rows.iloc[changed].reset_index(drop=True))
+    shares = {"a": solved_a.mean(axis=0)[changed], "b": solved_b.mean(axis=0)[changed]}
+    table = pd.DataFrame({"row": changed, "gained": np.isin(changed, flips.gained), **shares})
+    return table if rows is None else table.join(rows.iloc[changed].reset_index(drop=True))
 
 
 def _groups(a: np.ndarray, b: np.ndarray, rows: pd.DataFrame | None) -> Iterator[dict[str, str | int | float]]:
     groups = {ALL: np.arange(a.shape[1])}
     if rows is not None:
-        groups |= {f"subject {name}": own for name, own in sorted(rows.groupby("subject").indices.items())}
+        groups |= {f"subject {name}": members for name, members in sorted(rows.groupby("subject").indices.items())}
         regions = "ring " + rows["ring"].astype(str) + ", angle " + rows["angle"].astype(str)
-        groups |= {str(name): own for name, own in sorted(rows.groupby(regions).indices.items())}
-    for name, own in groups.items():
-        found = paired.published(a[:, own], b[:, own])
-        means = {"a": float(a[:, own].mean()), "b": float(b[:, own].mean())}
-        interval = {"difference": found.mean, "low": found.low, "high": found.high}
-        yield {"group": name, "rows": len(own), **means, **interval}
-
-
-class Incomparable(ValueError):
-    """Results that were not scored on the same settings."""
-
-
-@dataclass(frozen=True, slots=True)
-class SeedScores:
-    """Scores (seeds, settings) of one method on the split of a source's reaches that has this digest."""
-
-    name: str
-    reaches: str
-    split: str
-    digest: str
-    scores: np.ndarray
+        groups |= {str(name): members for name, members in sorted(rows.groupby(regions).indices.items())}
+    for name, members in groups.items():
+        difference = paired.published_difference(a[:, members], b[:, members])
+        means = {"a": float(a[:, members].mean()), "b": float(b[:, members].mean())}
+        interval = {"difference": difference.mean, "low": difference.low, "high": difference.high}
+        yield {"group": name, "rows": len(members), **means, **interval}
 
 
 def align(
     names: tuple[str, str], results: tuple[Results, Results], split: str, reaches: str | None
 ) -> tuple[SeedScores, SeedScores]:
-    """A and B on the same settings; `reaches` may be None where there is one source that both played.
+    """The scores of A and B on the same settings; `reaches` may be None if only one source has results of both.
 
     Raises Incomparable.
     """
-    source = _shared([{result["reaches"] for result in each} for each in results], reaches)
-    a, b = (_side(name, each, source, split) for name, each in zip(names, results, strict=True))
+    sources_a, sources_b = ({result["reaches"] for result in seeds} for seeds in results)
+    source = _common_source(sources_a, sources_b, reaches)
+    a, b = (_seed_scores(name, seeds, source, split) for name, seeds in zip(names, results, strict=True))
     if (a.digest, a.scores.shape[1]) != (b.digest, b.scores.shape[1]):
         raise Incomparable(
-            f"{a.name} and {b.name} played other versions of {split} of {source} reaches, "
+            f"{a.name} and {b.name} played different versions of {split} of {source} reaches, "
             f"{a.digest[:8]} and {b.digest[:8]}; run the older one again"
         )
     return a, b
 
 
-def _side(name: str, results: Results, reaches: str, split: str) -> SeedScores:
-    own = [result for result in results if result["reaches"] == reaches]
-    if lacking := [result for result in own if split not in result["splits"]]:
+def _seed_scores(name: str, results: Results, reaches: str, split: str) -> SeedScores:
+    seeds = [result for result in results if result["reaches"] == reaches]
+    if lacking := [result for result in seeds if split not in result["splits"]]:
         raise Incomparable(
             f"{name}, seed {lacking[0]['seed']}, has no split {split!r} of {reaches} reaches; "
-            f"it has {_listed(lacking[0]['splits'])}"
+            f"it has {_sorted_list(lacking[0]['splits'])}"
         )
-    seeds = [result["splits"][split] for result in own]
-    if len({(found["digest"], len(found["scores"])) for found in seeds}) > 1:
-        raise Incomparable(f"seeds of {name} played other versions of {split} of {reaches} reaches; run them again")
-    return SeedScores(name, reaches, split, seeds[0]["digest"], np.array([found["scores"] for found in seeds], float))
+    splits = [result["splits"][split] for result in seeds]
+    if len({(result["digest"], len(result["scores"])) for result in splits}) > 1:
+        raise Incomparable(
+            f"the seeds of {name} played different versions of {split} of {reaches} reaches; run them again"
+        )
+    return SeedScores(
+        name, reaches, split, splits[0]["digest"], np.array([result["scores"] for result in splits], float)
+    )
 
 
-def _shared(played: Sequence[set[str]], asked: str | None) -> str:
-    """The source of reaches that both sides played."""
-    both = played[0] & played[1]
-    if not both:
-        raise Incomparable(f"A has results on {_listed(played[0])} reaches, B on {_listed(played[1])}: none in common")
-    if asked is None and len(both) > 1:
-        raise Incomparable(f"both have results on {_listed(both)} reaches; choose with --reaches")
-    if asked is not None and asked not in both:
-        raise Incomparable(f"both have results on {_listed(both)} reaches, not both on {asked}")
-    return asked or next(iter(both))
+def _common_source(sources_a: set[str], sources_b: set[str], requested: str | None) -> str:
+    """The requested source of reaches, or the only one, if both methods have results on it."""
+    common = sources_a & sources_b
+    if not common:
+        raise Incomparable(
+            f"A has results on {_sorted_list(sources_a)} reaches, B on {_sorted_list(sources_b)} reaches: "
+            "no source is common to both"
+        )
+    if requested is None and len(common) > 1:
+        raise Incomparable(f"both have results on {_sorted_list(common)} reaches; choose one with --reaches")
+    if requested is not None and requested not in common:
+        raise Incomparable(f"both have results on {_sorted_list(common)} reaches, but not both on {requested} reaches")
+    return requested or next(iter(common))
+
+
+def _sorted_list(names: Iterable[str]) -> str:
+    return ", ".join(sorted(names))

@@ -1,4 +1,7 @@
-"""The paper's figures and the page's pictures; the only importer of matplotlib."""
+"""Draws the paper's figures and the page's pictures. Equal figures give equal bytes in every format.
+
+Longer than other modules, since it is the only one that imports matplotlib.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +23,13 @@ if TYPE_CHECKING:
     from dextron_bench.scores.comparison import Comparison
     from dextron_bench.success.exemplars import PredictedEpisode
 
-RIDGES = 40  # Curves of an episode, about.
+RIDGES = 40  # About how many curves an episode gets.
 FORMATS = (".pdf", ".png", ".svg")
-HUES = ("Blues", "Oranges", "Greens", "Greys")  # One for each angle; a ring farther out is darker.
+HUES = ("Blues", "Oranges", "Greens", "Greys")  # One for each angle; farther rings are darker.
 BETTER, WORSE = "tab:blue", "tab:orange"
 DATES = {".pdf": "CreationDate", ".svg": "Date"}  # Left out, so that equal figures have equal bytes.
-INK = "#010203"  # Stands for the page's own colour in pictures that are part of it.
-INLINE: Any = {  # Text stays text there, in the page's font; nothing is drawn behind.
+INK = "#010203"  # The page replaces this colour with the colour of its text.
+INLINE: Any = {  # For pictures inside the page: text stays text, and the background is transparent.
     **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
     **{"svg.fonttype": "none", "savefig.transparent": True, "legend.frameon": False, "text.parse_math": False},
     **{"axes.spines.top": False, "axes.spines.right": False},
@@ -35,18 +38,18 @@ BOTTLE_RADIUS, BOTTLE_HEIGHT = 0.025, 0.25  # [m]
 
 
 class UnknownFormat(ValueError):
-    """A picture's file name whose ending names no format."""
+    """The suffix of a picture's file names no supported format."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(f"{file}: no picture format {file.suffix!r}; choose from {', '.join(FORMATS)}")
 
 
 def reach_paths(source: Source, file: Path) -> None:
-    """Draws every reach of a source about the bottle in 3D, coloured by start region (paper, Fig. 3b).
+    """Draws all reaches of a source around the bottle in 3D, coloured by start region (paper, Fig. 3b).
 
-    Reaches are centred, without offset or duration noise. Raises UnknownFormat, OSError.
+    The reaches have no offset and no duration noise. Raises UnknownFormat, OSError.
     """
-    _check(file)
+    _check_format(file)
     figure = Figure(figsize=(7, 6), layout="constrained")
     axes = figure.add_subplot(projection="3d")
     assert isinstance(axes, Axes3D)
@@ -68,14 +71,15 @@ def reach_paths(source: Source, file: Path) -> None:
 
 
 def start_points(source: Source, rows: pd.DataFrame, file: Path) -> None:
-    """Draws where the palm's carrier starts in the settings of a table, seen from above (paper, Fig. 3a).
+    """Draws the start of the palm's carrier in each setting of a table, seen from above (paper, Fig. 3a).
 
-    `rows` has the columns of a setting, one point each, coloured by start region. Raises UnknownFormat, OSError.
+    `rows` has the columns of a setting. Each row is one point, coloured by its start region. Raises UnknownFormat,
+    OSError.
     """
-    _check(file)
+    _check_format(file)
     settings = from_frame(rows)
-    starts = np.array([source.path(each).positions[0, :2] for each in settings]).reshape(-1, 2)
-    colours = [_colour(source.stratum(each.reach)) for each in settings]
+    starts = np.array([source.path(setting).positions[0, :2] for setting in settings]).reshape(-1, 2)
+    colours = [_colour(source.stratum(setting.reach)) for setting in settings]
     figure = Figure(figsize=(6, 6.5), layout="constrained")
     axes = figure.add_subplot()
     axes.scatter(*starts.T, s=3, c=colours, linewidths=0)
@@ -91,23 +95,24 @@ def start_points(source: Source, rows: pd.DataFrame, file: Path) -> None:
 def learning_curves(
     curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFrame, file: Path, epochs: str = "epochs of 1,000 frames"
 ) -> None:
-    """Draws mean and range over seeds of the return on `val` against `epochs` (paper, Fig. 4a and 4c).
+    """Draws mean and range over seeds of the return on `val` against epochs (paper, Fig. 4a and 4c).
 
-    `curves` has a table for each method and seed, with columns `epoch` and `return`. Methods among the leaderboard's
-    `rows` that have none stand as a line at their return on `test`. Raises UnknownFormat, OSError.
+    `curves` has a table for each method and seed, with columns `epoch` and `return`. A method in the leaderboard's
+    `rows` without curves is a line at its return on `test`. `epochs` is the label of the axis. Raises UnknownFormat,
+    OSError.
     """
-    _check(file)
+    _check_format(file)
     figure = Figure(figsize=(8, 5), layout="constrained")
     axes = figure.add_subplot()
-    for place, (label, seeds) in enumerate(sorted(curves.items())):
+    for index, (label, seeds) in enumerate(sorted(curves.items())):
         table = pd.concat([points.set_index("epoch")["return"] for points in seeds.values()], axis=1)
-        mean, colour = table.mean(axis=1), f"C{place}"
+        mean, colour = table.mean(axis=1), f"C{index}"
         axes.plot(table.index, mean, color=colour, label=f"{label} ({len(seeds)} seeds)", linewidth=1.5)
         axes.fill_between(table.index, table.min(axis=1), table.max(axis=1), color=colour, alpha=0.15, linewidth=0)
-    steady = rows[(rows["split"] == "test") & ~rows["method"].isin(list(curves))]
-    for place, row in enumerate(steady.to_dict("records"), start=len(curves)):
-        style = ("--", ":", "-.")[place % 3]
-        axes.axhline(row["return"], color=f"C{place}", linewidth=1, linestyle=style, label=f"{row['method']} (on test)")
+    constant = rows[(rows["split"] == "test") & ~rows["method"].isin(list(curves))]
+    for index, row in enumerate(constant.to_dict("records"), start=len(curves)):
+        style = ("--", ":", "-.")[index % 3]
+        axes.axhline(row["return"], color=f"C{index}", linewidth=1, linestyle=style, label=f"{row['method']} (on test)")
     axes.set(xlabel=epochs, ylabel="sum of rewards", ylim=(0.0, 20.5), xlim=(0.0, None))
     axes.set_title("Mean and range over seeds on 50 settings of val")
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
@@ -115,11 +120,11 @@ def learning_curves(
 
 
 def success_curve(points: list[dict[str, float]], file: Path) -> None:
-    """Draws loss and accuracy of the success model against epochs, learned and held-out (paper, Fig. 4b).
+    """Draws loss and accuracy of the success model on training and held-out episodes against epochs (paper, Fig. 4b).
 
     Raises UnknownFormat, OSError.
     """
-    _check(file)
+    _check_format(file)
     figure = Figure(figsize=(8, 3.5), layout="constrained")
     table = pd.DataFrame(points).set_index("epoch")
     for axes, name in zip(figure.subplots(1, 2), ("loss", "accuracy"), strict=True):
@@ -131,32 +136,57 @@ def success_curve(points: list[dict[str, float]], file: Path) -> None:
 
 
 def ridges(episodes: dict[str, PredictedEpisode], file: Path) -> None:
-    """Draws what the success model thinks of every action, some RIDGES curves an episode, for titled ones (Fig. 5).
+    """Draws the success that the model predicts for every action, with about RIDGES curves an episode (paper, Fig. 5).
 
-    Time, as a share of the reach, goes up; a tick marks the action that was chosen. Green curves foretell the outcome,
-    red ones do not. Raises UnknownFormat, OSError.
+    `episodes` are named by their titles. Time increases upwards, as a share of the reach. A tick marks the chosen
+    action. Curves that predict the outcome correctly are green, others are red. Raises UnknownFormat, OSError.
     """
-    _check(file)
+    _check_format(file)
     figure = Figure(figsize=(2.6 * len(episodes), 5), layout="constrained")
     panels = figure.subplots(1, len(episodes), sharey=True, squeeze=False)[0]
-    for axes, (title, seen) in zip(panels, episodes.items(), strict=True):
-        curves, times = seen.insight.curves, seen.times
+    for axes, (title, predicted) in zip(panels, episodes.items(), strict=True):
+        curves, times = predicted.predictions.curves, predicted.times
         actions = np.linspace(-1.0, 1.0, curves.shape[1])
         shown = range(0, len(times), max(1, len(times) // RIDGES))
         height = 2.5 * times[-1] / len(shown)
-        for k in reversed(shown):  # Later steps lie behind.
-            base, colour = times[k], "tab:green" if seen.right[k] else "tab:red"
+        for k in reversed(shown):  # Draws later steps first, so that earlier ones cover them.
+            base, colour = times[k], "tab:green" if predicted.correct[k] else "tab:red"
             axes.fill_between(actions, base, base + height * curves[k], color=colour, alpha=0.5, linewidth=0)
             axes.plot(actions, base + height * curves[k], color="0.2", linewidth=0.4)
-            axes.plot([seen.episode.actions[k, 0]] * 2, [base, base + 0.5 * height], color="black", linewidth=1)
+            axes.plot([predicted.episode.actions[k, 0]] * 2, [base, base + 0.5 * height], color="black", linewidth=1)
         axes.set_title(title, fontsize=8, wrap=True)
         axes.set(xlabel="action", xlim=(-1.0, 1.0))
     panels[0].set_ylabel("time, as a share of the reach")
     _save(figure, file, 150)
 
 
+def differences(comparison: Comparison, file: Path) -> None:
+    """Draws how much more B scores than A: mean and interval of each group, and all settings in order of difference.
+
+    Blue means better, orange worse, grey not significant. Raises UnknownFormat, OSError.
+    """
+    _check_format(file)
+    groups = comparison.groups.iloc[::-1]
+    figure = Figure(figsize=(10, 1.5 + 0.22 * max(len(groups), 12)), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for height, row in enumerate(groups.to_dict("records")):
+        colour = BETTER if row["low"] > 0.0 else WORSE if row["high"] < 0.0 else "0.5"
+        left.plot([row["low"], row["high"]], [height, height], color=colour, linewidth=2)
+        left.plot(row["difference"], height, "o", color=colour, markersize=4)
+    left.set_yticks(range(len(groups)), [f"{row.group} ({row.rows})" for row in groups.itertuples()], fontsize=8)
+    left.set(xlabel="difference of mean return, with its 95 % interval", title="Groups (settings)")
+    settings = np.sort(comparison.b.scores.mean(axis=0) - comparison.a.scores.mean(axis=0))
+    right.bar(np.arange(len(settings)), settings, width=1.0, color=np.where(settings > 0.0, BETTER, WORSE))
+    right.set(xlabel="settings, in order", ylabel="difference of return", ylim=(-20.5, 20.5), title="Each setting")
+    for draw in (left.axvline, right.axhline):
+        draw(0.0, color="black", linewidth=0.8)
+    split = f"{comparison.a.split} of {comparison.a.reaches} reaches"
+    figure.suptitle(f"What {comparison.b.name} scores more than {comparison.a.name} on {split}", fontsize=10)
+    _save(figure, file, 150)
+
+
 def inline(draw: Callable[[Path], None]) -> str:
-    """The SVG that `draw` saves to a file, to stand in a page: INK and black are for the page to choose."""
+    """The SVG that `draw` saves to a file, for use inside the page. The page replaces INK and black."""
     with TemporaryDirectory() as folder, rc_context(INLINE):
         file = Path(folder) / "picture.svg"
         draw(file)
@@ -164,38 +194,13 @@ def inline(draw: Callable[[Path], None]) -> str:
 
 
 def _save(figure: Figure, file: Path, dpi: int) -> None:
-    """Writes a figure so that the same one gives the same bytes."""
+    """Writes a figure so that equal figures give equal bytes."""
     date = DATES.get(file.suffix.lower())
     with rc_context({"svg.hashsalt": "dextron-bench"}):
         figure.savefig(file, dpi=dpi, metadata={date: None} if date else None)
 
 
-def differences(found: Comparison, file: Path) -> None:
-    """Draws what B scores more than A: its mean and interval in every group, and each setting's own, in order of size.
-
-    Blue is better, orange worse, grey not told from none. Raises UnknownFormat, OSError.
-    """
-    _check(file)
-    groups = found.groups.iloc[::-1]
-    figure = Figure(figsize=(10, 1.5 + 0.22 * max(len(groups), 12)), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for place, row in enumerate(groups.to_dict("records")):
-        colour = BETTER if row["low"] > 0.0 else WORSE if row["high"] < 0.0 else "0.5"
-        left.plot([row["low"], row["high"]], [place, place], color=colour, linewidth=2)
-        left.plot(row["difference"], place, "o", color=colour, markersize=4)
-    left.set_yticks(range(len(groups)), [f"{row.group} ({row.rows})" for row in groups.itertuples()], fontsize=8)
-    left.set(xlabel="difference of mean return, with its 95 % interval", title="Groups (settings)")
-    each = np.sort(found.b.scores.mean(axis=0) - found.a.scores.mean(axis=0))
-    right.bar(np.arange(len(each)), each, width=1.0, color=np.where(each > 0.0, BETTER, WORSE))
-    right.set(xlabel="settings, in order", ylabel="difference of return", ylim=(-20.5, 20.5), title="Each setting")
-    for draw in (left.axvline, right.axhline):
-        draw(0.0, color="black", linewidth=0.8)
-    split = f"{found.a.split} of {found.a.reaches} reaches"
-    figure.suptitle(f"What {found.b.name} scores more than {found.a.name} on {split}", fontsize=10)
-    figure.savefig(file, dpi=150)
-
-
-def _check(file: Path) -> None:
+def _check_format(file: Path) -> None:
     if file.suffix.lower() not in FORMATS:
         raise UnknownFormat(file)
 
@@ -205,6 +210,6 @@ def _colour(stratum: Stratum) -> tuple[float, float, float, float]:
 
 
 def _bottle(axes: Axes3D) -> None:
-    turn, height = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 24), [0.0, BOTTLE_HEIGHT])
-    x, y = BOTTLE_RADIUS * np.cos(turn), BOTTLE_RADIUS * np.sin(turn)
+    angles, height = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 24), [0.0, BOTTLE_HEIGHT])
+    x, y = BOTTLE_RADIUS * np.cos(angles), BOTTLE_RADIUS * np.sin(angles)
     axes.plot_surface(x, y, height, color="tab:red", alpha=0.4)

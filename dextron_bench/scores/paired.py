@@ -1,6 +1,6 @@
-"""Methods compared on equal settings: differences, settings that flip, and ranks (docs/statistics.md).
+"""Compares methods on equal settings: differences, settings that flip, and ranks (docs/statistics.md).
 
-Scores are arrays (seeds, settings) whose columns are the same settings for all methods.
+Scores are arrays (seeds, settings). A column is the same setting for all methods.
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ from scipy.stats import binomtest, norm
 
 from dextron_bench.scores import statistics
 
-POWER = 0.8  # Chance with which a difference of the size `detectable` shows.
+POWER = 0.8  # Chance that a difference of the size `detectable` is significant.
 
 
 @dataclass(frozen=True, slots=True)
 class Difference(statistics.Estimate):
-    """What B scores more than A, with its 95 % interval, and the smallest difference that would be told from none."""
+    """How much more B scores than A, with its 95 % interval and the smallest difference that the test can detect."""
 
     detectable: float
 
     @property
     def is_worse(self) -> bool:
-        """Whether B is worse beyond noise."""
+        """True if B is worse beyond noise: the whole interval is below 0."""
         return self.high < 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Flips:
-    """Settings whose outcome differs: rows (n,) that more seeds of B solve than of A, rows (m,) that fewer do.
+    """Settings with different outcomes: rows that more seeds of B solve than of A (n,), and rows that fewer do (m,).
 
-    `p_value` is that of McNemar's exact test: how likely so uneven a share is where neither method is better.
+    `p_value` belongs to McNemar's exact test: the chance of a split at least this uneven if the methods are equal.
     """
 
     gained: np.ndarray
@@ -41,38 +41,38 @@ class Flips:
 
 
 def difference(a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> Difference:
-    """Mean of scores B less that of A, each (seeds, settings), by a bootstrap of the difference.
+    """Mean of scores B minus mean of scores A, both (seeds, settings), by a bootstrap of the difference.
 
-    Each resample draws settings once, for both, and seeds for each method by itself. Equal generators give
+    Each resample draws settings once for both methods, and seeds for each method separately. Equal generators give
     opposite differences for (a, b) and (b, a).
     """
-    settings = statistics.drawn(a.shape[1], rng)
-    swap = b.tobytes() < a.tobytes()  # Seeds are drawn in an order that does not hang on which is called A.
-    first, second = (statistics.resampled(scores, settings, rng) for scores in ((b, a) if swap else (a, b)))
+    settings = statistics.draw_counts(a.shape[1], rng)
+    swap = b.tobytes() < a.tobytes()  # The order of the draws must not depend on which method is called A.
+    first, second = (statistics.resampled_means(scores, settings, rng) for scores in ((b, a) if swap else (a, b)))
     resamples = first - second if swap else second - first
-    found = statistics.interval(float(b.mean() - a.mean()), resamples)
-    return Difference(found.mean, found.low, found.high, detectable(resamples))
+    estimate = statistics.interval(float(b.mean() - a.mean()), resamples)
+    return Difference(estimate.mean, estimate.low, estimate.high, detectable(resamples))
 
 
-def published(a: np.ndarray, b: np.ndarray) -> Difference:
-    """The difference that ranks and `compare` go by: from equal scores the same interval everywhere."""
+def published_difference(a: np.ndarray, b: np.ndarray) -> Difference:
+    """The difference that ranks and `compare` use: equal scores give the same interval everywhere."""
     return difference(a, b, np.random.default_rng(0))
 
 
 def detectable(resamples: np.ndarray) -> float:
-    """The smallest true difference that a test at 5 % would find with a chance of 80 %, where noise is as it was here.
+    """The smallest true difference that a test at 5 % detects with a chance of 80 %, given the noise of the resamples.
 
-    That is 2.8 standard errors; `resamples` (RESAMPLES,) are of the difference.
+    The size is 2.8 standard errors. `resamples` (RESAMPLES,) are resamples of the difference.
     """
     return float((norm.ppf(1.0 - statistics.TAIL) + norm.ppf(POWER)) * resamples.std())
 
 
 def flips(a: np.ndarray, b: np.ndarray) -> Flips:
-    """Rows that flip between successes A and B, booleans (seeds, settings), and McNemar's exact test of them.
+    """Rows that flip between successes A and B, booleans (seeds, settings), with McNemar's exact test.
 
-    A setting counts once, however many seeds played it, since its seeds do not fall independently: as gained or lost
-    by the number of seeds that solve it. As many seeds of either method count, the first ones, for with three seeds
-    against one "more seeds solve it" would favour a side even between equals. With a seed each it is McNemar's test.
+    The seeds of a setting are not independent, so each setting counts once: gained or lost by the number of seeds
+    that solve it. Only the first seeds count if one method has more: with three seeds against one, "more seeds solve
+    it" would favour one side even between equal methods. With one seed each, this is McNemar's test.
     """
     seeds = min(len(a), len(b))
     more = b[:seeds].sum(axis=0, dtype=int) - a[:seeds].sum(axis=0, dtype=int)
@@ -82,20 +82,21 @@ def flips(a: np.ndarray, b: np.ndarray) -> Flips:
 
 
 def ranks(scores: Sequence[np.ndarray]) -> list[int]:
-    """Ranks from 1, shared by methods that cannot be told from the best of their group.
+    """Ranks from 1; methods that do not differ significantly from the best of their group share its rank.
 
-    From the highest mean down, a method opens a group where the interval of its difference from the method that
-    opened the last one, as `published`, does not hold 0; its rank is then its place. Scores are (seeds, settings)
-    each, of the same settings. Where means are equal, scores decide who opens, so that the order of methods does not.
+    Methods are taken from the highest mean down. A method starts a new group if the interval of its
+    `published_difference` from the first method of the current group excludes 0; its rank is then its position.
+    Each entry of `scores` is (seeds, settings) on the same settings. Equal means are ordered by their scores, so the
+    order of the input does not matter.
     """
-    order = sorted(range(len(scores)), key=lambda each: (-scores[each].mean(), scores[each].tobytes()))
-    found, rank, opener = [0] * len(scores), 0, -1
-    for place, each in enumerate(order, start=1):
-        if rank == 0 or _apart(published(scores[opener], scores[each])):
-            opener, rank = each, place
-        found[each] = rank
-    return found
+    order = sorted(range(len(scores)), key=lambda method: (-scores[method].mean(), scores[method].tobytes()))
+    method_ranks, rank, leader = [0] * len(scores), 0, -1
+    for position, method in enumerate(order, start=1):
+        if rank == 0 or _is_significant(published_difference(scores[leader], scores[method])):
+            leader, rank = method, position
+        method_ranks[method] = rank
+    return method_ranks
 
 
-def _apart(found: Difference) -> bool:
-    return found.low > 0.0 or found.high < 0.0
+def _is_significant(result: Difference) -> bool:
+    return result.low > 0.0 or result.high < 0.0

@@ -1,16 +1,17 @@
-"""The leaderboard: rows computed from the scores of episodes, never typed."""
+"""The rows of the leaderboard, computed from the scores of episodes."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.methods import registry
+from dextron_bench.reaches.sources import RankedSource
 from dextron_bench.scores import paired, statistics
 from dextron_bench.splits import strata
 from dextron_bench.world import task
@@ -20,88 +21,93 @@ COLUMNS = (
     "return", "return_low", "return_high", "success", "success_low", "success_high",
     "iqm", "iqm_low", "iqm_high", "regret", *CAUSES, "closing_lag",
 )  # fmt: skip
-CONTESTED = ("real", "synthetic")  # Sources on which methods are ranked; SIM's own world is none.
-Board = dict[str, list[dict[str, Any]]]  # By method, what each of its seeds scored on one version of a split.
+Board = dict[str, list[dict[str, Any]]]  # By method: what each of its seeds scored on one version of a split.
 
 
 class UnevenResults(ValueError):
-    """Results of one version of a split that have not the same number of rows."""
+    """Results on one version of a split have different numbers of rows."""
 
 
 def table(results: Iterable[dict[str, Any]]) -> pd.DataFrame:
     """One row for each method, source, split and split version, best first, with the columns COLUMNS.
 
-    `results` are the contents of `result.json` files, one a seed. Success rates lie in [0, 1], the columns CAUSES are
-    numbers of episodes, `closing_lag` [s] is the mean over seeds of their medians, NaN where no hand closed. `rank` is
-    NaN for who is no entrant, `iqm` where the split is not one that ships, `regret` where EXP has no scores.
+    `results` are the contents of `result.json` files, one for each seed. Success rates lie in [0, 1]. The columns
+    CAUSES count episodes. `closing_lag` [s] is the mean over seeds of their medians, NaN if no hand closed. `rank` is
+    NaN for methods that are not ranked, `iqm` for splits that do not ship, `regret` if EXP has no scores.
     Raises UnevenResults.
     """
-    found = [row for key, board in _boards(results).items() for row in _rows(key, board)]
-    return pd.DataFrame(found, columns=list(COLUMNS)).sort_values(
+    rows = [row for key, board in _boards(results).items() for row in _rows(key, board)]
+    return pd.DataFrame(rows, columns=list(COLUMNS)).sort_values(
         ["reaches", "split", "return", "method"], ascending=[True, True, False, True], ignore_index=True
     )
 
 
-def is_entrant(method: str, reaches: str) -> bool:
-    """Whether a method is ranked: not the ceiling, which is told each setting's expert, and not in SIM's own world."""
-    return method not in registry.CEILINGS and reaches in CONTESTED
+def is_ranked(method: str, reaches: str) -> bool:
+    """False for the ceiling, which receives each setting's expert, and for all methods on SIM's own reaches."""
+    return method not in registry.CEILINGS and reaches in get_args(RankedSource)
 
 
 def _boards(results: Iterable[dict[str, Any]]) -> dict[tuple[str, str, str], Board]:
-    """What can be compared: the scores of all methods by source of reaches, split and its digest."""
+    """The scores of all methods by source of reaches, split and its digest: one board holds comparable scores."""
     boards: dict[tuple[str, str, str], Board] = defaultdict(lambda: defaultdict(list))
     for result in results:
-        for name, found in result["splits"].items():
-            boards[(result["reaches"], name, found["digest"])][result["method"]].append(found)
+        for name, split_result in result["splits"].items():
+            boards[(result["reaches"], name, split_result["digest"])][result["method"]].append(split_result)
     return boards
 
 
 def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
-    """The rows of a board. A method's numbers do not depend on who else is there, but for its rank."""
+    """The rows of a board. Of a method's numbers, only its rank depends on the other methods."""
     reaches, split, digest = key
-    lengths = {len(found["scores"]) for seeds in board.values() for found in seeds}
+    lengths = {len(seed["scores"]) for seeds in board.values() for seed in seeds}
     if len(lengths) > 1:
-        raise UnevenResults(f"results on {split} of {reaches}, version {digest[:8]}, differ in their number of rows")
-    scores = {method: np.array([found["scores"] for found in seeds], float) for method, seeds in board.items()}
-    settings = statistics.drawn(lengths.pop(), np.random.default_rng(0))
-    resamples = {method: statistics.resampled(each, settings, _stream(method)) for method, each in scores.items()}
-    entrants = [method for method in scores if is_entrant(method, reaches)]
-    ranks = dict(zip(entrants, paired.ranks([scores[method] for method in entrants]), strict=True))
+        raise UnevenResults(
+            f"results on {split} of {reaches}, version {digest[:8]}, have different numbers of rows: "
+            f"{', '.join(map(str, sorted(lengths)))}"
+        )
+    scores = {method: np.array([seed["scores"] for seed in seeds], float) for method, seeds in board.items()}
+    settings = statistics.draw_counts(lengths.pop(), np.random.default_rng(0))
+    ranked = [method for method in scores if is_ranked(method, reaches)]
+    ranks = dict(zip(ranked, paired.ranks([scores[method] for method in ranked]), strict=True))
     regions = strata.regions(reaches, split, digest)
     ceiling = next((scores[method].mean() for method in registry.CEILINGS if method in scores), np.nan)
-    for method, each in scores.items():
-        solved = np.equal(each, task.SUCCESS).astype(float)
+    for method, returns in scores.items():
         yield {
-            **dict(zip(("reaches", "split", "version"), (reaches, split, digest[:8]), strict=True)),
-            **{"rank": ranks.get(method, np.nan), "method": method, "seeds": len(each), "episodes": each.size},
-            **_spread("return", statistics.interval(float(each.mean()), resamples[method])),
-            **_spread(
-                "success", statistics.interval(solved.mean(), statistics.resampled(solved, settings, _stream(method)))
-            ),
-            **(
-                _spread("iqm", statistics.interquartile_mean(each, regions, _stream(method)))
-                if regions is not None
-                else {}
-            ),
-            "regret": ceiling - each.mean(),
+            **{"reaches": reaches, "split": split, "version": digest[:8]},
+            **{"rank": ranks.get(method, np.nan), "method": method, "seeds": len(returns), "episodes": returns.size},
+            **_estimates(method, returns, settings, regions),
+            "regret": ceiling - returns.mean(),
             **_endings(board[method]),
         }
 
 
-def _stream(method: str) -> np.random.Generator:
-    """Each method's own random numbers, so that methods' seeds are drawn independently and one more changes none."""
+def _estimates(method: str, returns: np.ndarray, settings: np.ndarray, regions: np.ndarray | None) -> dict[str, float]:
+    """Return, success and interquartile mean of a method with their intervals; the latter only with `regions`."""
+    solved = np.equal(returns, task.SUCCESS).astype(float)
+    estimates = {
+        name: statistics.interval(
+            float(values.mean()), statistics.resampled_means(values, settings, _method_rng(method))
+        )
+        for name, values in (("return", returns), ("success", solved))
+    }
+    if regions is not None:
+        estimates["iqm"] = statistics.interquartile_mean(returns, regions, _method_rng(method))
+    columns: dict[str, float] = {}
+    for name, estimate in estimates.items():
+        columns |= {name: estimate.mean, f"{name}_low": estimate.low, f"{name}_high": estimate.high}
+    return columns
+
+
+def _method_rng(method: str) -> np.random.Generator:
+    """A generator for each method, so that seeds of methods are independent and a new method changes no other row."""
     return np.random.default_rng([0, *method.encode()])
 
 
-def _spread(name: str, found: statistics.Estimate) -> dict[str, float]:
-    return {name: found.mean, f"{name}_low": found.low, f"{name}_high": found.high}
-
-
 def _endings(seeds: list[dict[str, Any]]) -> dict[str, Any]:
-    """How the episodes of all seeds end."""
-    lags = [found["closing_lag"] for found in seeds if found["closing_lag"] is not None]
+    """How many episodes of all seeds end by each cause, how many failed, and the closing lag."""
+    lags = [seed["closing_lag"] for seed in seeds if seed["closing_lag"] is not None]
     return {
-        "failed": sum(found["failed"] for found in seeds),
-        **{cause: sum(found["causes"].get(cause, 0) for found in seeds) for cause in CAUSES},
+        "failed": sum(seed["failed"] for seed in seeds),
+        **{cause: sum(seed["causes"].get(cause, 0) for seed in seeds) for cause in CAUSES},
         "closing_lag": float(np.mean(lags)) if lags else np.nan,
     }

@@ -1,4 +1,4 @@
-"""Rows computed from scores, with numbers done by hand."""
+"""Rows of the leaderboard, compared with numbers computed by hand."""
 
 import numpy as np
 import pandas as pd
@@ -24,7 +24,7 @@ def test_a_row_is_the_mean_over_seeds_and_settings():
     assert row["return_low"] < 13.75 < row["return_high"]
 
 
-def test_best_first_and_versions_of_a_split_apart():
+def test_the_best_row_is_first_and_each_version_of_a_split_is_separate():
     rows = standings.table([result("a", 0, [0.0]), result("b", 0, [20.0]), result("a", 0, [5.0], digest="b" * 64)])
     assert rows["method"].tolist() == ["b", "a", "a"]
     assert rows["version"].tolist() == ["aaaaaaaa", "bbbbbbbb", "aaaaaaaa"]
@@ -34,7 +34,7 @@ def test_a_higher_score_that_is_not_20_is_no_success():
     assert standings.table([result("a", 0, [19.0, 20.0])]).iloc[0]["success"] == 0.5
 
 
-def test_endings_are_counted_over_seeds_and_lags_averaged_where_a_hand_closed():
+def test_endings_are_summed_over_seeds_and_lags_averaged_over_seeds_that_have_one():
     scores = [result("a", 0, [20.0, 3.0], lag=0.1), result("a", 1, [1.0, 2.0], lag=0.3), result("a", 2, [0.0, 0.0])]
     row = standings.table(scores).iloc[0]
     assert (row["solved"], row["slipped"], row["too late"]) == (1, 5, 0)
@@ -46,7 +46,7 @@ def test_no_results_make_an_empty_table():
 
 
 def noisy(method: str, lead: float, seed: int = 0, reaches: str = "real", digest: str = "a" * 64) -> dict:
-    """Made-up scores of 50 rows about 10 + lead, in steps, with little noise."""
+    """Invented integer scores of 50 rows around 10 + lead, with little noise."""
     scores = 10.0 + lead + np.random.default_rng([seed, *method.encode()]).integers(-2, 3, 50)
     return result(method, seed, scores.tolist(), digest) | {"reaches": reaches}
 
@@ -55,13 +55,13 @@ def column(results: list[dict], name: str) -> dict:
     return standings.table(results).set_index("method")[name].to_dict()
 
 
-def test_entrants_are_ranked_and_the_ceiling_is_not():
-    found = column([noisy("exp", 9.0), noisy("bc", 4.0), noisy("rl", 0.0), noisy("nothing", -6.0)], "rank")
-    assert np.isnan(found.pop("exp"))
-    assert found == {"bc": 1, "rl": 2, "nothing": 3}
+def test_methods_are_ranked_but_the_ceiling_is_not():
+    ranks = column([noisy("exp", 9.0), noisy("bc", 4.0), noisy("rl", 0.0), noisy("nothing", -6.0)], "rank")
+    assert np.isnan(ranks.pop("exp"))
+    assert ranks == {"bc": 1, "rl": 2, "nothing": 3}
 
 
-def test_nothing_is_ranked_in_the_world_that_sim_learns_in():
+def test_no_method_is_ranked_on_minjerk_reaches():
     rows = standings.table([noisy("sim", 4.0, reaches="minjerk"), noisy("nothing", 0.0, reaches="minjerk")])
     assert rows["rank"].isna().all()
 
@@ -71,16 +71,18 @@ def test_ranks_are_by_source_split_and_version():
     assert rows["rank"].tolist() == [1, 2, 1]
 
 
-def test_regret_is_what_exp_scores_more():
-    found = column([result("exp", 0, [20.0, 12.0]), result("a", 0, [10.0, 2.0]), result("a", 1, [20.0, 4.0])], "regret")
-    assert found == {"exp": 0.0, "a": 7.0}
+def test_regret_is_the_lead_of_exp():
+    regrets = column(
+        [result("exp", 0, [20.0, 12.0]), result("a", 0, [10.0, 2.0]), result("a", 1, [20.0, 4.0])], "regret"
+    )
+    assert regrets == {"exp": 0.0, "a": 7.0}
 
 
 def test_without_exp_there_is_no_regret():
     assert standings.table([result("a", 0, [20.0])])["regret"].isna().all()
 
 
-def test_one_more_entrant_changes_no_other_interval():
+def test_a_new_method_changes_no_other_interval():
     alone = [noisy("a", 1.0, seed) for seed in range(3)]
     rows = standings.table([*(noisy("b", 5.0, seed) for seed in range(3)), *alone])
     assert rows["rank"].tolist() == [1, 2]
@@ -90,27 +92,29 @@ def test_one_more_entrant_changes_no_other_interval():
     )
 
 
-def test_the_interquartile_mean_is_over_the_regions_of_a_split_that_ships():
-    """The four regions nearest to -x score 20, nine score 0; three are cut off at either end."""
+def test_the_interquartile_mean_of_a_shipped_split_is_taken_over_its_regions():
+    """The four regions nearest to -x score 20, nine score 0; three are dropped at each end."""
     split = load_split("real", "test")
     near = strata.strata(split)["angle"] == 0
-    made = result("a", 0, np.where(near, 20.0, 0.0).tolist(), split.digest)
-    row = standings.table([made]).iloc[0]
-    assert row["iqm"] == 20.0 / 7  # Of 13 regions the middle seven: one that scores 20.
+    results = result("a", 0, np.where(near, 20.0, 0.0).tolist(), split.digest)
+    row = standings.table([results]).iloc[0]
+    assert row["iqm"] == 20.0 / 7  # One of the middle seven of 13 regions scores 20.
     assert np.isnan(standings.table([result("a", 0, [20.0])]).iloc[0]["iqm"])
 
 
 def test_results_of_unequal_length_are_refused():
-    with pytest.raises(standings.UnevenResults, match="test of real, version aaaaaaaa"):
+    with pytest.raises(
+        standings.UnevenResults, match="test of real, version aaaaaaaa, have different numbers of rows: 1, 2"
+    ):
         standings.table([result("a", 0, [1.0]), result("b", 0, [1.0, 2.0])])
 
 
-def test_seeds_of_two_methods_are_drawn_apart():
-    """A's seeds are 1 better than B's, but spread by 10: drawn together, the difference would always be 1."""
+def test_seeds_of_two_methods_are_drawn_independently():
+    """A's seeds are 1 better than B's, but far apart. If they were drawn together, the difference would always be 1."""
     seeds = (0.0, 9.0, 18.0)
-    made = [
+    results = [
         result(method, k, [lead + mean] * 50)
         for method, lead in (("a", 1.0), ("b", 0.0))
         for k, mean in enumerate(seeds)
     ]
-    assert column(made, "rank") == {"a": 1, "b": 1}
+    assert column(results, "rank") == {"a": 1, "b": 1}

@@ -1,0 +1,26 @@
+"""Equal figures give equal bytes, at any time and in any format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dextron_bench.scores import comparison, figures
+
+
+@pytest.mark.parametrize("suffix", [".pdf", ".svg", ".png"])
+def test_equal_comparisons_give_equal_bytes(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    scores = np.random.default_rng(0).choice([0.0, 20.0], (2, 3, 20))
+    a, b = (comparison.SeedScores(name, "real", "test", "a" * 64, scores[k]) for k, name in enumerate("ab"))
+    files = [tmp_path / f"{name}{suffix}" for name in ("today", "tomorrow")]
+    for day, file in enumerate(files):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", str(86_400 * day))  # Matplotlib takes its date from here.
+        figures.differences(comparison.compare(a, b), file)
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_an_unknown_format_lists_the_known_ones(tmp_path: Path):
+    with pytest.raises(figures.UnknownFormat, match=r"difference\.gif: .*'\.gif'.*\.pdf, \.png, \.svg"):
+        figures.success_curve([{"epoch": 1.0}], tmp_path / "difference.gif")
