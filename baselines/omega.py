@@ -56,7 +56,7 @@ class Omega:
         """The same for every seed; raises NoModel, BadModel, BadTensors."""
         self.digest()
         file = Path(self.model)
-        found = SuccessModel(tensors.read(file)) if self.model.endswith(FILE) else network.shipped(self.model)
+        found = SuccessModel(tensors.read(file)) if self.model.endswith(FILE) else network.shipped_model(self.model)
         return OmegaAgent(found, self.tolerance, self.near)
 
     def digest(self) -> str:
@@ -65,7 +65,7 @@ class Omega:
             known = ", ".join(SOURCES)
             raise NoModel(f"--model takes the file of a model (*{FILE}) or one of {known}, not {self.model!r}")
         try:
-            found = hashing.sha256(Path(self.model)) if self.model.endswith(FILE) else network.digest(self.model)
+            found = hashing.sha256(Path(self.model)) if self.model.endswith(FILE) else network.model_digest(self.model)
         except (OSError, network.MissingModel) as error:
             raise NoModel(f"no success model at hand ({error}); --model takes the file of one") from error
         if found != (self.sha256 or found):

@@ -82,12 +82,12 @@ class Figures:
         from dextron_bench.splits.loading import load_split
         from dextron_bench.success import exemplars, network
 
-        figures.success_curve(network.told(self.reaches)["curve"], self._file("fig4b"))
+        figures.success_curve(network.training_info(self.reaches)["curve"], self._file("fig4b"))
         yield self._file("fig4b")
         files = [file for file in weights.everything(self.reaches) if file.stem == "seed0"]
         policies = {file.parts[-3]: weights.own(file) for file in files}
-        model, cases = network.shipped(self.reaches), load_split(self.reaches, "test").cases[: self.settings]
-        seen = exemplars.foreseen(model, open_source(self.reaches), cases, policies, self.threads)
+        model, cases = network.shipped_model(self.reaches), load_split(self.reaches, "test").cases[: self.settings]
+        seen = exemplars.play_and_predict(model, open_source(self.reaches), cases, policies, self.threads)
         chosen = exemplars.choose(seen)
         figures.ridges({exemplars.KINDS[kind]: each for kind, each in chosen.items()}, self._file("fig5"))
         yield self._file("fig5")

@@ -73,11 +73,11 @@ class Serve:
 
     def __call__(self) -> int:
         from dextron_bench.leaderboard import server as leaderboard_server
-        from dextron_bench.recording import ViewerError, web_viewer
+        from dextron_bench.recording import ViewerError, web_viewer_files
 
         with leaderboard_server.Server(leaderboard_server.Site(self.into), self.port) as server:
             try:
-                server.site.viewer.update(web_viewer())
+                server.site.viewer.update(web_viewer_files())
             except ViewerError as error:
                 print(f"dextron-bench: recordings will be downloaded, not opened: {error}", file=sys.stderr)
             print(server.address, flush=True)

@@ -85,7 +85,7 @@ class Export:
     def __call__(self) -> int:
         from dextron_bench.recording import export, film
 
-        look = film.Look(self.width, self.height, self.camera, self.speed)
+        look = film.FilmStyle(self.width, self.height, self.camera, self.speed)
         with progress_bar("pictures", self.quiet) as progress:
             export.export(self.file, self.into, look, progress)
         print(self.into)

@@ -45,13 +45,13 @@ class Data:
         from dextron_bench.success import generation
 
         agents = {hashing.sha256(file): weights.own(file) for file in self.policies}
-        wanted = generation.Collection(self.reaches, self.seed, tuple(agents))
+        wanted = generation.DatasetConfig(self.reaches, self.seed, tuple(agents))
         source, train = open_source(self.reaches), load_split(self.reaches, "train").cases
         folder = folder_of(self.runs, self.reaches, self.seed)
         with progress_bar("transitions", self.quiet) as progress:
-            found = generation.collect(source, train, wanted, folder, self.rows, agents, self.threads, progress)
-        rows = [{"kind": kind, **tally.about()} for kind, tally in found.items() if tally.rows]
-        rows.append({"kind": "all", **sum(found.values(), generation.Tally()).about()})
+            found = generation.generate(source, train, wanted, folder, self.rows, agents, self.threads, progress)
+        rows = [{"kind": kind, **tally.as_dict()} for kind, tally in found.items() if tally.rows]
+        rows.append({"kind": "all", **sum(found.values(), generation.Tally()).as_dict()})
         if self.json:
             print_json(rows)
         else:
@@ -87,7 +87,7 @@ class Train:
 
         folder = folder_of(self.runs, self.reaches, self.data)
         with progress_bar("epochs", self.quiet) as progress:
-            training.fit(folder, training.Fit(epochs=self.epochs, seed=self.seed), progress)
+            training.train(folder, training.TrainingConfig(epochs=self.epochs, seed=self.seed), progress)
         told = tensors.read_about(folder / training.MODEL)
         best = told["curve"][told["best_epoch"] - 1]
         columns = ["epoch", "loss", "accuracy", "test_loss", "test_accuracy"]

@@ -61,9 +61,9 @@ class Eval:
         for name in self.split or ranking_splits(self.reaches):
             cases = _first(load_split(self.reaches, name).cases, self.rows)
             for player, agent in players.items():
-                played = cases if agent else evaluation.contrasted(cases)
+                played = cases if agent else evaluation.with_random_experts(cases)
                 found = evaluation.evaluate(model, source, played, agent, self.threads)
-                rows.append({"split": name, "player": player, **found.about()})
+                rows.append({"split": name, "player": player, **found.as_dict()})
         if self.json:
             print_json(rows)
         else:
@@ -106,7 +106,7 @@ class Explain:
         model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
         cases = _first(load_split(self.reaches, self.split).cases, self.rows)
         policies = {str(policy): weights.own(policy) for policy in self.policies}
-        found = exemplars.choose(exemplars.foreseen(model, source, cases, policies, self.threads))
+        found = exemplars.choose(exemplars.play_and_predict(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
         figures.ridges({exemplars.KINDS[kind]: seen for kind, seen in found.items()}, self.into)
         columns = ["kind", "player", "row", "reach", "return", "cause", "steps foretold [%]"]
@@ -119,7 +119,7 @@ class Explain:
                 seen.episode.setting.reach,
                 seen.episode.score,
                 seen.diagnosis.cause,
-                seen.foretold * 100,
+                seen.accuracy * 100,
             ]
             for kind, seen in found.items()
         ]
@@ -143,7 +143,7 @@ def chosen(file: Path | None, runs: Path, reaches: str) -> SuccessModel:
 
     own = folder_of(runs, reaches, 0) / training.MODEL
     if file is None and not own.exists():
-        return network.shipped(reaches)
+        return network.shipped_model(reaches)
     place = file or own
     learned = tensors.read_about(place).get("data", {}).get("search", {}).get("reaches", reaches)
     if learned != reaches:

@@ -108,7 +108,7 @@ class View:
         if len(places) != 2:
             raise selection.BadFilter(f"--diff takes two places, recordings or runs; it got {len(self.place)}")
         first, second = places
-        return side_by_side.contrast(first, second, wish, self.runs)
+        return side_by_side.side_by_side(first, second, wish, self.runs)
 
     def _perform(self) -> int:
         from dextron_bench import recording
@@ -126,7 +126,7 @@ class View:
         reaches = self.reaches[0] if self.reaches else "synthetic"
         label, agent = weights.agent_by_name(self.method[0], reaches, self.seed[0] if self.seed else 0)
         split = load_split(reaches, self.split[0] if self.split else "test")
-        model, source = network.shipped(reaches), open_source(reaches)
+        model, source = network.shipped_model(reaches), open_source(reaches)
         cases = {row: split.case(row) for row in self.row or (0,)}
         with recording.open_live_viewer() as (connect, wait):
             for row, case in cases.items():
@@ -148,7 +148,7 @@ class View:
 
         picked, matching = selection.select(selection.episodes(places), wish)
         with progress_bar("recordings", self.quiet) as progress:
-            files = rerecording.restore(picked, progress)
+            files = rerecording.rerecord(picked, progress)
         if not self.print:
             _tell(picked)
         if len(picked) < matching and wish.worst is None and wish.best is None:

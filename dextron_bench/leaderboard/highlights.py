@@ -15,7 +15,7 @@ from dextron_bench.evaluation.replay import replay
 from dextron_bench.methods import registry
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import from_frame
-from dextron_bench.recording import Recorded, read_safely, summarise
+from dextron_bench.recording import Recording, read_safely, summarise
 from dextron_bench.runs import rerecording, selection
 from dextron_bench.splits.loading import Split, known_splits, load_split
 from dextron_bench.storage import atomic
@@ -49,7 +49,7 @@ def choose(runs: Path, reaches: Sequence[str], split: str, rows: int) -> pd.Data
 def make(chosen: pd.DataFrame, into: Path) -> list[Path]:
     """Copies the recordings of chosen episodes, made where they are missing, to `<name>.rrd` in a folder."""
     files = [into / f"{name}.rrd" for name in chosen["name"]]
-    for file, recorded in zip(files, rerecording.restore(chosen), strict=True):
+    for file, recorded in zip(files, rerecording.rerecord(chosen), strict=True):
         atomic.write_atomically(file, lambda part, recorded=recorded: shutil.copyfile(recorded, part))
     return files
 
@@ -65,7 +65,7 @@ def _ends(known: pd.DataFrame) -> Iterator[pd.DataFrame]:
 def _kinds(known: pd.DataFrame, reaches: str, split: str) -> Iterator[pd.DataFrame]:
     """The clearest episode of each of the five kinds that explain the success model, where one ships."""
     try:
-        model = network.shipped(reaches)
+        model = network.shipped_model(reaches)
     except network.MissingModel:
         return
     for kind, seen in exemplars.choose(_foreseen(model, known, reaches, split)).items():
@@ -82,7 +82,7 @@ def _foreseen(model: network.SuccessModel, known: pd.DataFrame, reaches: str, sp
     for place, episode in sorted(replay(source, from_frame(kept), kept["actions"].tolist()), key=lambda each: each[0]):
         row = kept.iloc[place]
         player = EXPERT if row["method"] == EXPERTS else str(row["method"])
-        yield exemplars.predict(model, source, cases[row["row"]], player, episode)
+        yield exemplars.predict_episode(model, source, cases[row["row"]], player, episode)
 
 
 FOLDER = "recordings"  # Beside the leaderboard's.
@@ -157,11 +157,11 @@ def _foresight(file: Path) -> Iterator[PredictedEpisode]:
         yield _foresee(recorded, split)
 
 
-def _foresee(recorded: Recorded, split: Split) -> PredictedEpisode:
-    model, source = network.shipped(split.reaches), sources.open_source(split.reaches)
+def _foresee(recorded: Recording, split: Split) -> PredictedEpisode:
+    model, source = network.shipped_model(split.reaches), sources.open_source(split.reaches)
     case = split.case(int(recorded.properties["row"]))
     method = str(recorded.properties["method"])
-    return exemplars.predict(model, source, case, EXPERT if method == "exp" else method, recorded.episode)
+    return exemplars.predict_episode(model, source, case, EXPERT if method == "exp" else method, recorded.episode)
 
 
 def _kind(stem: str) -> str | None:

@@ -3,26 +3,25 @@
 The only package that talks to Rerun.
 """
 
-from dextron_bench.recording.episode_file import BrokenRecording, Recorded, Value, read, write
+from dextron_bench.recording.episode_file import BrokenRecording, Recording, Value, read, write
 from dextron_bench.recording.live_view import LiveView, open_live_viewer
-from dextron_bench.recording.pair import UnequalSettings, pair
+from dextron_bench.recording.pair import UnequalSettings, write_pair
 from dextron_bench.recording.rrd_file import UnwritableRecording
 from dextron_bench.recording.summaries import ReaderError, Summary, read_safely, read_screened, screen, summarise
 from dextron_bench.recording.viewer import ViewerError, screenshots, view
-from dextron_bench.recording.web_viewer import web_viewer
+from dextron_bench.recording.web_viewer import web_viewer_files
 
 __all__ = [
     "BrokenRecording",
     "LiveView",
     "ReaderError",
-    "Recorded",
+    "Recording",
     "Summary",
     "UnequalSettings",
     "UnwritableRecording",
     "Value",
     "ViewerError",
     "open_live_viewer",
-    "pair",
     "read",
     "read_safely",
     "read_screened",
@@ -30,6 +29,7 @@ __all__ = [
     "screenshots",
     "summarise",
     "view",
-    "web_viewer",
+    "web_viewer_files",
     "write",
+    "write_pair",
 ]

@@ -54,13 +54,13 @@ def signals(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
     yield Chunk.from_columns("/signals/metres", when, rr.Scalars.columns(scalars=metres))
 
 
-def actions(taken: np.ndarray, first: int = 0) -> Chunk:
+def action_chunk(taken: np.ndarray, first: int = 0) -> Chunk:
     """The actions (T, 1) that were taken from step `first` on."""
     when = scene.timelines(first, first + len(taken) - 1)
     return Chunk.from_columns("/episode/actions", when, rr.Scalars.columns(scalars=taken))
 
 
-def lines() -> list[Chunk]:
+def line_styles() -> list[Chunk]:
     """Names and colours of the plotted lines, the same for every episode."""
     return [
         scene.static(entity, rr.SeriesLines(names=list(looks), colors=list(looks.values()), widths=[2.0] * len(looks)))
@@ -77,7 +77,7 @@ def outcome(episode: Episode) -> str:
     return "success" if episode.success else "held too briefly" if episode.score else "not lifted"
 
 
-def card(episode: Episode, properties: Mapping[str, object]) -> Chunk:
+def text_card(episode: Episode, properties: Mapping[str, object]) -> Chunk:
     """Outcome, properties and setting, to be read beside the plots."""
     told = {
         **properties,

@@ -33,7 +33,7 @@ Value = str | int | float | bool
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class Recording:
     """An episode as its file tells it, and the properties that were given with it."""
 
     episode: Episode
@@ -61,10 +61,10 @@ def write(
     Raises UnwritableRecording, and ValueError where the arrays make no episode.
     """
     rr.set_strict_mode(True)
-    chunks = [*_chunks(episode, properties), scene.plan(path), *scene.chunks(episode.states)]
+    chunks = [*_chunks(episode, properties), scene.planned_path(path), *scene.chunks(episode.states)]
     if insight:
         last = len(episode.actions) - 1
-        chunks += [*success_plots.looks(insight.grid), *success_plots.chunks(insight, episode.actions)]
+        chunks += [*success_plots.static_chunks(insight.grid), *success_plots.chunks(insight, episode.actions)]
         chunks += success_plots.ridge(insight, episode.actions[:, 0], last, episode.success)
     props, told = _props()
     identity = digest([*told, *lines(chunks)])
@@ -73,7 +73,7 @@ def write(
     return rrd_file.save(file, chunks, identity, blueprint.blueprint(insight is not None), application)
 
 
-def read(file: Path, sha256: str | None = None) -> Recorded:
+def read(file: Path, sha256: str | None = None) -> Recording:
     """The episode in `file`, its arrays bit for bit as they were written; raises BrokenRecording.
 
     The file's SHA-256, if given, is checked before anything is decoded; without it `read_safely` is for files
@@ -96,13 +96,13 @@ def read(file: Path, sha256: str | None = None) -> Recorded:
     except (KeyError, StopIteration) as error:
         lacking = f"it lacks {error}" if isinstance(error, KeyError) else "it lacks an array"
         raise BrokenRecording(file, f"is a recording of another version of {APPLICATION}: {lacking}") from error
-    return Recorded(episode, _properties(kept, "run"))
+    return Recording(episode, _properties(kept, "run"))
 
 
 @cache
 def _props() -> tuple[list[Chunk], list[str]]:
     """What every recording has, and its lines of the digest."""
-    chunks = [*scene.props(), *blueprint.lines()]
+    chunks = [*scene.static_chunks(), *blueprint.line_styles()]
     return chunks, list(lines(chunks))
 
 
@@ -121,7 +121,7 @@ def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk
     yield Chunk.from_property("episode", rr.AnyValues(**_values(facts)))
     if properties:
         yield Chunk.from_property("run", rr.AnyValues(**_values(properties)))
-    yield blueprint.card(episode, properties)
+    yield blueprint.text_card(episode, properties)
     yield from blueprint.signals(episode.states)
 
 

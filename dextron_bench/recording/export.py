@@ -23,7 +23,7 @@ class UnknownEnding(ValueError):
         super().__init__(f"{file}: cannot export to {file.suffix!r}; choose from {', '.join([*FILMS, *TABLES])}")
 
 
-def export(source: Path, into: Path, look: film.Look, report: film.Report = lambda done, total: None) -> None:
+def export(source: Path, into: Path, look: film.FilmStyle, report: film.Report = lambda done, total: None) -> None:
     """Writes a recording's episode to `into`, in the format that its name ends with, whole or not at all.
 
     `look` is that of films, and `report` is told (pictures drawn, all). Raises UnknownEnding, BrokenRecording,
@@ -36,12 +36,12 @@ def export(source: Path, into: Path, look: film.Look, report: film.Report = lamb
     if ending in FILMS:
         atomic.write_atomically(into, lambda part: FILMS[ending](part, episode.states, look, report))
     elif ending == ".csv":
-        atomic.write_atomically(into, lambda part: table(episode).to_csv(part, index=False))
+        atomic.write_atomically(into, lambda part: step_table(episode).to_csv(part, index=False))
     else:
-        atomic.write_atomically(into, lambda part: table(episode).to_parquet(part, index=False))
+        atomic.write_atomically(into, lambda part: step_table(episode).to_parquet(part, index=False))
 
 
-def table(episode: Episode) -> pd.DataFrame:
+def step_table(episode: Episode) -> pd.DataFrame:
     """A row for each of an episode's T + 1 states: `step`, `seconds`, the state, the action that was taken in it and
     the reward that the action earned; the last state has neither.
     """

@@ -23,7 +23,7 @@ QUALITY = "18"  # Constant rate factor of x264: less is better, and larger.
 Report = Callable[[int, int], None]  # Told (pictures drawn, all).
 
 
-class BadLook(ValueError):
+class BadFilmStyle(ValueError):
     """A film that cannot be made so."""
 
 
@@ -32,10 +32,10 @@ class NoEncoder(RuntimeError):
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class FilmStyle:
     """How a film looks: its size [pixels], whence it is seen, and how many times as quick as life.
 
-    Raises BadLook, UnknownCamera.
+    Raises BadFilmStyle, UnknownCamera.
     """
 
     width: int = 640
@@ -46,26 +46,26 @@ class Look:
     def __post_init__(self) -> None:
         for name, size in (("width", self.width), ("height", self.height)):
             if size % 2 or not SIZES[0] <= size <= SIZES[1]:
-                raise BadLook(
+                raise BadFilmStyle(
                     f"{name} {size}: films have an even number of pixels from {SIZES[0]} to {SIZES[1]} a side"
                 )
         if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
-            raise BadLook(f"speed {self.speed:g}: choose from {SPEEDS[0]:g} to {SPEEDS[1]:g} times life's")
+            raise BadFilmStyle(f"speed {self.speed:g}: choose from {SPEEDS[0]:g} to {SPEEDS[1]:g} times life's")
         if self.camera not in renderer.CAMERAS:
             raise renderer.UnknownCamera(self.camera)
 
 
-def steps(count: int, rate: float, speed: float) -> tuple[list[int], float]:
+def shown_steps(count: int, rate: float, speed: float) -> tuple[list[int], float]:
     """Which of `count` states a film shows, the last one always, and how many a second [1/s], `rate` at most."""
     stride = max(1.0, speed / model.CONTROL_STEP / rate)
     shown = [int(k * stride + 1e-9) for k in range(int((count - 1) / stride + 1e-9) + 1)]
     return [*shown, *([count - 1] if shown[-1] != count - 1 else [])], speed / model.CONTROL_STEP / stride
 
 
-def mp4(file: Path, states: np.ndarray, look: Look, report: Report) -> None:
+def mp4(file: Path, states: np.ndarray, look: FilmStyle, report: Report) -> None:
     """Writes states (T, 48) as H.264 to `file`, whatever it is called; raises NoEncoder, NoGraphics."""
     av = _encoder()
-    shown, rate = steps(len(states), RATES[".mp4"], look.speed)
+    shown, rate = shown_steps(len(states), RATES[".mp4"], look.speed)
     with av.open(str(file), "w", format="mp4", options={"movflags": "faststart"}) as container:
         stream = container.add_stream("libx264", Fraction(rate).limit_denominator(1000), {"crf": QUALITY})
         stream.width, stream.height, stream.pix_fmt = look.width, look.height, "yuv420p"
@@ -74,9 +74,9 @@ def mp4(file: Path, states: np.ndarray, look: Look, report: Report) -> None:
         container.mux(stream.encode())  # What it still holds back.
 
 
-def gif(file: Path, states: np.ndarray, look: Look, report: Report) -> None:
+def gif(file: Path, states: np.ndarray, look: FilmStyle, report: Report) -> None:
     """Writes states (T, 48) as an endless GIF of one palette to `file`, whatever it is called; raises NoGraphics."""
-    shown, rate = steps(len(states), RATES[".gif"], look.speed)
+    shown, rate = shown_steps(len(states), RATES[".gif"], look.speed)
     ends = np.rint(1000.0 / rate / TICK * np.arange(len(shown) + 1)) * TICK
     palette = _palette(states[[0, len(states) // 2, -1]], look)
     drawn = (
@@ -88,14 +88,14 @@ def gif(file: Path, states: np.ndarray, look: Look, report: Report) -> None:
     first.save(file, "GIF", save_all=True, append_images=drawn, duration=durations, loop=0)
 
 
-def _pictures(states: np.ndarray, look: Look, report: Report = lambda done, total: None) -> Iterator[np.ndarray]:
+def _pictures(states: np.ndarray, look: FilmStyle, report: Report = lambda done, total: None) -> Iterator[np.ndarray]:
     with renderer.Painter(look.width, look.height, supersampling=1) as painter:
         for done, state in enumerate(states, start=1):
             yield painter.paint(state, renderer.CAMERAS[look.camera])
             report(done, len(states))
 
 
-def _palette(states: np.ndarray, look: Look) -> Image.Image:
+def _palette(states: np.ndarray, look: FilmStyle) -> Image.Image:
     """The colours of some states' pictures."""
     return Image.fromarray(np.concatenate(list(_pictures(states, look)))).quantize(256, dither=Image.Dither.NONE)
 

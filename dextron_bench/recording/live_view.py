@@ -32,7 +32,12 @@ class LiveView:
         self._stream.send_blueprint(blueprint.blueprint(foretold=True, live=True))
         table = "\n".join(f"| {name} | {value} |" for name, value in about.items())
         text = rr.TextDocument(f"### Live\n\n| | |\n|---|---|\n{table}\n", media_type="text/markdown")
-        props = [*scene.props(), *blueprint.lines(), scene.plan(path), scene.static("/card", text)]
+        props = [
+            *scene.static_chunks(),
+            *blueprint.line_styles(),
+            scene.planned_path(path),
+            scene.static("/card", text),
+        ]
         self._stream.send_chunks(props)
         self._last = min(len(path.positions) - 1 + task.HOLD, task.STEP_LIMIT)
 
@@ -44,9 +49,9 @@ class LiveView:
             insight.grid, insight.curves[now:], insight.chances[now:], insight.experts[now:], insight.duration
         )
         chunks = [*scene.chunks(states[before:], before), *blueprint.signals(states[now:], now)]
-        chunks += [blueprint.actions(actions[now:], now), *success_plots.chunks(part, actions[now:], now)]
+        chunks += [blueprint.action_chunk(actions[now:], now), *success_plots.chunks(part, actions[now:], now)]
         if now == 0:
-            chunks += success_plots.looks(insight.grid)
+            chunks += success_plots.static_chunks(insight.grid)
         if now % EVERY == 0:
             chunks += success_plots.ridge(insight, actions[:, 0], self._last)
         self._stream.send_chunks(chunks)
@@ -65,7 +70,7 @@ def open_live_viewer(*arguments: str) -> Iterator[tuple[Connect, Callable[[], No
     Both raise ViewerError where it is gone, as does this.
     """
     port = viewer.free_port()
-    with viewer.process(["--port", str(port), "--hide-welcome-screen", *arguments]) as opened:
+    with viewer.viewer_process(["--port", str(port), "--hide-welcome-screen", *arguments]) as opened:
         where = viewer.address(port, opened)
 
         def connect(stream: rr.RecordingStream) -> None:

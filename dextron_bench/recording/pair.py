@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench.recording import blueprint, rrd_file, scene
-from dextron_bench.recording.episode_file import Recorded
+from dextron_bench.recording.episode_file import Recording
 from dextron_bench.recording.summaries import PAIR, read_safely
 
 SIDES = "/a", "/b"
@@ -27,7 +27,7 @@ class UnequalSettings(ValueError):
     """Two recordings that are not of the same setting."""
 
 
-def pair(file: Path, first: Path, second: Path) -> Path:
+def write_pair(file: Path, first: Path, second: Path) -> Path:
     """Writes one recording in which two of equal settings play at once; returns it.
 
     Raises BrokenRecording, UnequalSettings, UnwritableRecording. It is for looking: `read` takes single episodes.
@@ -48,7 +48,7 @@ def pair(file: Path, first: Path, second: Path) -> Path:
     return file
 
 
-def _name(recorded: Recorded) -> str:
+def _name(recorded: Recording) -> str:
     told = recorded.properties
     return f"{told.get('method', 'unknown')}, seed {told['seed']}" if "seed" in told else str(told.get("method", ""))
 

@@ -51,7 +51,7 @@ def chunks(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
     yield Chunk.from_columns(TRACE, later, rr.LineStrips3D.columns(strips=legs))
 
 
-def plan(path: reach.Path) -> Chunk:
+def planned_path(path: reach.Path) -> Chunk:
     """The way that the palm's centre is to go."""
     planned = reach.palm_centre(path.positions, path.quaternions)
     return static("/world/path", rr.LineStrips3D([planned], radii=[0.0012], colors=[PATH_COLOUR]))
@@ -87,7 +87,7 @@ def _entity(body: int) -> str:
     return f"/world/{model.load().body(body).name}"
 
 
-def props() -> list[Chunk]:
+def static_chunks() -> list[Chunk]:
     """What does not change in the 3D view, and is the same for every episode."""
     whole = {body: [shapes.fixed(*each) for each in kinds.items()] for body, kinds in shapes.bodies().items()}
     kept = [static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, *whole.pop(0))]

@@ -25,8 +25,8 @@ CLEAR = (0.0, 5.0, 0.0)  # [m] where the bottle is put to show the hand alone.
 def write_pictures(folder: Path) -> list[Path]:
     """Writes hero.png and hand-open-half-closed.png to `folder`; returns their paths. Raises NoGraphics."""
     folder.mkdir(parents=True, exist_ok=True)
-    lifted = lift().states[-BEFORE_END]
-    hands = [renderer.render(hand(lifted, closure), 426, 320, "hand", LAMPS) for closure in CLOSURES]
+    lifted = play_lift().states[-BEFORE_END]
+    hands = [renderer.render(hand_alone(lifted, closure), 426, 320, "hand", LAMPS) for closure in CLOSURES]
     pictures = {
         "hero.png": renderer.render(lifted, 1280, 720, "hero", LAMPS),
         "hand-open-half-closed.png": np.concatenate(hands, axis=1),
@@ -36,14 +36,14 @@ def write_pictures(folder: Path) -> list[Path]:
     return [folder / name for name in pictures]
 
 
-def lift() -> Episode:
+def play_lift() -> Episode:
     """A grasp that succeeds: the expert on the first reach of the minimum-jerk world."""
     source = MinjerkSource()
     case = Case(Setting(source.names[0], 0.0, 0.0, 0.0), EXPERT, window=0.0)
     return next(episode for _, episode in rollout(ExpertAgent(), source, [case]))
 
 
-def hand(state: np.ndarray, closure: float) -> np.ndarray:
+def hand_alone(state: np.ndarray, closure: float) -> np.ndarray:
     """The state (48,) with the bottle out of sight and every digit closed so far, 0 open to 1 closed."""
     compiled = model.load()
     posed = state.copy()

@@ -58,7 +58,7 @@ def ridge(insight: StepPredictions, actions: np.ndarray, last: int, success: boo
     yield Chunk.from_columns("/ridge/now", when, rr.LineStrips2D.columns(strips=now))
 
 
-def looks(grid: np.ndarray) -> list[Chunk]:
+def static_chunks(grid: np.ndarray) -> list[Chunk]:
     """What all episodes share: colours, places of the bars on the grid (A,) of actions, and two bars of 1 as scale."""
     ends, places = [-1.1, 1.1], len(grid)
     return [

@@ -13,7 +13,7 @@ from typing import Any
 
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.recording import reader_process
-from dextron_bench.recording.episode_file import ENDS, BrokenRecording, Recorded, Value, read
+from dextron_bench.recording.episode_file import ENDS, BrokenRecording, Recording, Value, read
 from dextron_bench.recording.rrd_file import APPLICATION, APPLICATIONS
 
 NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Told of every episode.
@@ -54,12 +54,12 @@ def screen(files: Iterable[Path]) -> Iterator[Summary]:
     return _summaries(files, whole=True)
 
 
-def read_safely(file: Path) -> Recorded:
+def read_safely(file: Path) -> Recording:
     """The episode in a file of unknown origin; raises BrokenRecording, ReaderError."""
     return read_screened(next(screen([file])))
 
 
-def read_screened(summary: Summary) -> Recorded:
+def read_screened(summary: Summary) -> Recording:
     """The episode in a file that `screen` summarised; raises BrokenRecording."""
     if summary.damage:
         raise BrokenRecording(summary.file, summary.damage)

@@ -32,7 +32,7 @@ def view(files: Sequence[Path]) -> None:
     Raises ViewerError, and FileNotFoundError for a recording that is not there.
     """
     _all_there(files)
-    with process(["--port", "auto", *map(str, files)]) as opened:
+    with viewer_process(["--port", "auto", *map(str, files)]) as opened:
         wait(opened)
 
 
@@ -50,7 +50,7 @@ def screenshots(file: Path, pictures: Mapping[int, Path], width: int = 1600, hei
     _all_there([file])
     port = free_port()
     window = ["--headless", "--window-size", f"{width}x{height}", "--hide-welcome-screen", "--port", str(port)]
-    with TemporaryFile() as logs, process(window, logs) as opened:
+    with TemporaryFile() as logs, viewer_process(window, logs) as opened:
         try:
             client = ViewerClient.connect(address(port, opened))
             client.open(str(file.resolve()))
@@ -73,7 +73,7 @@ def _all_there(files: Sequence[Path]) -> None:
 
 
 @contextmanager
-def process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
+def viewer_process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
     """A viewer process, ended with all its children when the block is left."""
     command = [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *arguments]
     environment = {"WGPU_BACKEND": "vulkan", **os.environ} if logs else None

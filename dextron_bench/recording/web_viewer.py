@@ -5,7 +5,7 @@ from __future__ import annotations
 from http.client import HTTPConnection, HTTPException
 from tempfile import TemporaryFile
 
-from dextron_bench.recording.viewer import LOOPBACK, ViewerError, address, free_port, process
+from dextron_bench.recording.viewer import LOOPBACK, ViewerError, address, free_port, viewer_process
 
 KINDS = {  # By name; the viewer asks for nothing else.
     "index.html": "text/html; charset=utf-8",
@@ -16,14 +16,14 @@ KINDS = {  # By name; the viewer asks for nothing else.
 }
 
 
-def web_viewer() -> dict[str, tuple[str, bytes]]:
+def web_viewer_files() -> dict[str, tuple[str, bytes]]:
     """The web viewer's files by name, each with its kind (MIME type), about 43 MB; takes a second.
 
     Rerun's own server, which keeps a core busy, runs for that long only and on this machine alone. Raises ViewerError.
     """
     port, control = free_port(), free_port()
     words = ["--serve-web", "--web-viewer-port", str(port), "--port", str(control)]
-    with TemporaryFile() as logs, process(words, logs) as opened:
+    with TemporaryFile() as logs, viewer_process(words, logs) as opened:
         address(port, opened)
         try:
             return {name: (kind, _get(port, name)) for name, kind in KINDS.items()}

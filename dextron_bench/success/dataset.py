@@ -10,7 +10,7 @@ from dextron_bench.storage import tensors
 from dextron_bench.world import model
 
 REMEDY = "remove it, and the same `dextron-bench success data` plays it again"
-HELD = 5  # Every so many episodes of a block one is for testing: 80 % and 20 %, by episode (paper, II.E).
+TEST_EVERY = 5  # Every so many episodes of a block one is for testing: 80 % and 20 %, by episode (paper, II.E).
 
 
 class EmptyDataset(LookupError):
@@ -33,12 +33,12 @@ class Dataset:
             raise BadDataset(
                 f"{folder} lacks block {lost[0]:06d}; the same `dextron-bench success data` plays it again"
             )
-        self._files, self._blocks = files, [block(file) for file in files]
+        self._files, self._blocks = files, [open_block(file) for file in files]
         if len(np.unique(np.concatenate([each["solved"] for each in self._blocks]))) < 2:
             raise BadDataset(
                 f"all episodes in {folder} end alike, which teaches nothing; `success data` with more --rows"
             )
-        chosen = [np.arange(len(block["solved"])) % HELD == HELD - 1 for block in self._blocks]
+        chosen = [np.arange(len(block["solved"])) % TEST_EVERY == TEST_EVERY - 1 for block in self._blocks]
         chosen = [held == test for held in chosen]
         pairs = list(zip(self._blocks, chosen, strict=True))
         self._of = np.repeat(np.arange(len(files)), [mine.sum() for mine in chosen])
@@ -64,7 +64,7 @@ class Dataset:
         return states, actions, self._solved[episodes].astype(np.int64)
 
 
-def block(file: Path) -> dict[str, np.ndarray]:
+def open_block(file: Path) -> dict[str, np.ndarray]:
     """The arrays of a block, left on the disk: `states` (R, 48), `actions` (R,), `starts` (E + 1,) and `solved` (E,).
 
     Raises BadDataset, OSError.

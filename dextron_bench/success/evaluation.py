@@ -19,25 +19,25 @@ from dextron_bench.success.metrics import Metrics
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.world import model as world_model
 
-PARTS = 10  # Of a reach, in each of which the AUC is told; what comes after its end is one more.
+TIME_BINS = 10  # Of a reach, in each of which the AUC is told; what comes after its end is one more.
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """The judgement of all transitions, and the AUC (PARTS + 1,) in each tenth of the reach, and after it."""
+    """The judgement of all transitions, and the AUC (TIME_BINS + 1,) in each tenth of the reach, and after it."""
 
     overall: Metrics
     auc_by_time: np.ndarray
     calibration: tuple[np.ndarray, np.ndarray, np.ndarray]
 
-    def about(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """All of it by name, as JSON has it: no NaN."""
         means, shares, counts = (_plain(values) for values in self.calibration)
         told = {"auc_by_time": _plain(self.auc_by_time), "predicted": means, "observed": shares, "predictions": counts}
         return {name: None if value != value else value for name, value in asdict(self.overall).items()} | told
 
 
-def contrasted(cases: Sequence[Case], seed: int = 0) -> list[Case]:
+def with_random_experts(cases: Sequence[Case], seed: int = 0) -> list[Case]:
     """Every case twice: with the expert that solves it, and with one drawn uniformly, so that outcomes differ."""
     rng = np.random.default_rng([seed, len(cases)])
     gains, criticals = (rng.uniform(*bounds, len(cases)) for bounds in (policies.GAIN, policies.CRITICAL_DISTANCE))
@@ -51,8 +51,8 @@ def evaluate(
     """Judges the model on every transition of an agent's episodes, by default of the cases' experts."""
     parts = [_foretold(model, source, episode) for episode in _played(source, cases, agent, threads)]
     chances, outcomes, times = (np.concatenate(column) for column in zip(*parts, strict=True))
-    of = np.minimum((times * PARTS).astype(int), PARTS)
-    by_time = np.array([metrics.auc(chances[of == part], outcomes[of == part]) for part in range(PARTS + 1)])
+    of = np.minimum((times * TIME_BINS).astype(int), TIME_BINS)
+    by_time = np.array([metrics.auc(chances[of == part], outcomes[of == part]) for part in range(TIME_BINS + 1)])
     return Evaluation(metrics.evaluate(chances, outcomes), by_time, metrics.calibration(chances, outcomes))
 
 

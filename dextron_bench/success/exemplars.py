@@ -14,8 +14,8 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, ExpertAgent
 from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
-from dextron_bench.success import predict as step_predictions
 from dextron_bench.success.network import SuccessModel
+from dextron_bench.success.predict import predict
 from dextron_bench.world import model as world_model
 
 KINDS = {
@@ -38,39 +38,37 @@ class PredictedEpisode:
     player: str
     episode: Episode
     diagnosis: Diagnosis
-    insight: StepPredictions
+    predictions: StepPredictions
 
     @property
     def times(self) -> np.ndarray:
         """When each step (T,) is, as a share of the reach's duration."""
-        return np.arange(len(self.insight.chances)) / self.insight.duration
+        return np.arange(len(self.predictions.chances)) / self.predictions.duration
 
     @property
-    def right(self) -> np.ndarray:
+    def correct(self) -> np.ndarray:
         """True for the steps (T,) at which the outcome is foretold."""
-        return (self.insight.chances > 0.5) == self.episode.success
+        return (self.predictions.chances > 0.5) == self.episode.success
 
     @property
-    def foretold(self) -> float:
+    def accuracy(self) -> float:
         """The share of steps at which the outcome is foretold."""
-        return float(self.right.mean())
+        return float(self.correct.mean())
 
 
-def predict(model: SuccessModel, source: Source, case: Case, player: str, episode: Episode) -> PredictedEpisode:
+def predict_episode(model: SuccessModel, source: Source, case: Case, player: str, episode: Episode) -> PredictedEpisode:
     """What the model thinks at each step of an episode of a case."""
-    return PredictedEpisode(
-        player, episode, diagnose(episode, case), step_predictions.predict(model, source, case, episode)
-    )
+    return PredictedEpisode(player, episode, diagnose(episode, case), predict(model, source, case, episode))
 
 
-def foreseen(
+def play_and_predict(
     model: SuccessModel, source: Source, cases: Sequence[Case], policies: Mapping[str, Agent], threads: int = 0
 ) -> Iterator[PredictedEpisode]:
     """Episodes of experts and of named policies on the same cases, as the model foretells them."""
     for player, agent in {EXPERT: ExpertAgent(), **policies}.items():
         played = dict(rollout(agent, source, cases, threads=threads))
         for row, case in enumerate(cases):
-            yield predict(model, source, case, player, played[row])
+            yield predict_episode(model, source, case, player, played[row])
 
 
 def choose(seen: Iterable[PredictedEpisode]) -> dict[str, PredictedEpisode]:
@@ -85,15 +83,15 @@ def choose(seen: Iterable[PredictedEpisode]) -> dict[str, PredictedEpisode]:
 
 def _scores(seen: PredictedEpisode) -> dict[str, float]:
     """How clear an episode is as the kind that it is, if it is any."""
-    own, curves, chances = seen.player != EXPERT, seen.insight.curves, seen.insight.chances
+    own, curves, chances = seen.player != EXPERT, seen.predictions.curves, seen.predictions.chances
     if own and not seen.episode.success:  # What experts do wrong explains no policy.
         if seen.diagnosis.cause == "too early":
             return {"early": _fall(chances)}
         if (curves.max(axis=1) >= OPEN).any() and curves[-1].max() <= SHUT:
-            return {"fading": seen.foretold * float((curves.max(axis=1) - chances).mean())}
-    if seen.foretold < RIGHT:
-        return {"wrong": 1.0 - seen.foretold}
-    return {"policy" if own else "expert": seen.foretold} if seen.episode.success else {}
+            return {"fading": seen.accuracy * float((curves.max(axis=1) - chances).mean())}
+    if seen.accuracy < RIGHT:
+        return {"wrong": 1.0 - seen.accuracy}
+    return {"policy" if own else "expert": seen.accuracy} if seen.episode.success else {}
 
 
 def _fall(chances: np.ndarray) -> float:

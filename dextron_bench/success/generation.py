@@ -28,12 +28,12 @@ KINDS = SOLVED, UNIFORM, POLICY = ("solved", "uniform", "policy")
 Report = Callable[[int, int], None]  # Told (rows, rows wanted).
 
 
-class BadCollection(ValueError):
+class BadDatasetConfig(ValueError):
     """A data set that cannot be."""
 
 
 @dataclass(frozen=True)
-class Collection:
+class DatasetConfig:
     """Which data set: equal ones hold equal rows.
 
     The kinds of blocks go round, so that half of the experts' episodes are drawn from those that solve their setting
@@ -47,8 +47,10 @@ class Collection:
     block: int = 256
 
     def __post_init__(self) -> None:
-        if self.block < dataset.HELD or self.seed < 0:
-            raise BadCollection(f"a data set needs at least {dataset.HELD} episodes a block, and a seed of 0 or more")
+        if self.block < dataset.TEST_EVERY or self.seed < 0:
+            raise BadDatasetConfig(
+                f"a data set needs at least {dataset.TEST_EVERY} episodes a block, and a seed of 0 or more"
+            )
 
     def kind(self, number: int) -> str:
         """What the episodes of a block are."""
@@ -68,7 +70,7 @@ class Tally:
     episodes: int = 0
     solved: int = 0
 
-    def about(self) -> dict[str, float]:
+    def as_dict(self) -> dict[str, float]:
         """Its numbers by name, with the share of episodes that succeed."""
         return {**asdict(self), "success_rate": self.solved / self.episodes if self.episodes else 0.0}
 
@@ -76,7 +78,7 @@ class Tally:
         return Tally(self.rows + other.rows, self.episodes + other.episodes, self.solved + other.solved)
 
 
-def draw(source: Source, train: Sequence[Case], collection: Collection, number: int) -> list[Case]:
+def draw_cases(source: Source, train: Sequence[Case], collection: DatasetConfig, number: int) -> list[Case]:
     """What the episodes of a block are played on: nothing but reaches of `train`, the cases of that split."""
     rng = np.random.default_rng([collection.seed, number])
     if collection.kind(number) != UNIFORM:
@@ -89,10 +91,10 @@ def draw(source: Source, train: Sequence[Case], collection: Collection, number: 
     return [Case(_sample(source, known, rng), Expert(gain, critical), 0.0) for gain, critical in pairs]
 
 
-def collect(
+def generate(
     source: Source,
     train: Sequence[Case],
-    collection: Collection,
+    collection: DatasetConfig,
     folder: Path,
     rows: int,
     agents: Mapping[str, Agent],
@@ -101,33 +103,33 @@ def collect(
 ) -> dict[str, Tally]:
     """Plays blocks until there are so many rows; returns what there is of each kind.
 
-    `agents` are the policies by name. Raises BadCollection, FolderMismatch where the folder holds another data set,
+    `agents` are the policies by name. Raises BadDatasetConfig, FolderMismatch where the folder holds another data set,
     BadDataset where a block is damaged, and what `rollout` does.
     """
     if rows < 1:
-        raise BadCollection(f"--rows is how many transitions there are to be, 1 or more, not {rows}")
+        raise BadDatasetConfig(f"--rows is how many transitions there are to be, 1 or more, not {rows}")
     blocks.claim(asdict(collection), folder)
     tallies, number = {kind: Tally() for kind in KINDS}, 0
     while (done := sum(tally.rows for tally in tallies.values())) < rows:
         report(done, rows)
-        file, kind = file_of(folder, number), collection.kind(number)
+        file, kind = block_file(folder, number), collection.kind(number)
         if not file.exists():
             agent = agents[collection.player(number)] if kind == POLICY else ExpertAgent()
-            _play(source, draw(source, train, collection, number), agent, threads, file)
-        tallies[kind] += tally_of(file)
+            _play(source, draw_cases(source, train, collection, number), agent, threads, file)
+        tallies[kind] += block_tally(file)
         number += 1
     report(done, rows)
     return tallies
 
 
-def file_of(folder: Path, number: int) -> Path:
+def block_file(folder: Path, number: int) -> Path:
     """Where a block is stored."""
     return folder / "blocks" / f"{number:06d}.safetensors"
 
 
-def tally_of(file: Path) -> Tally:
+def block_tally(file: Path) -> Tally:
     """What a block holds; raises BadDataset, OSError."""
-    found = dataset.block(file)
+    found = dataset.open_block(file)
     return Tally(len(found["actions"]), len(found["solved"]), int(found["solved"].sum()))
 
 

@@ -72,25 +72,25 @@ class SuccessModel:
 
 
 @cache
-def shipped(reaches: str) -> SuccessModel:
+def shipped_model(reaches: str) -> SuccessModel:
     """The model that ships for a source of reaches; raises MissingModel."""
-    with as_file(_place(reaches)) as file:
+    with as_file(_model_file(reaches)) as file:
         return SuccessModel(tensors.read(file))
 
 
-def told(reaches: str) -> dict[str, Any]:
+def training_info(reaches: str) -> dict[str, Any]:
     """What the file of the model that ships says of its training: `fit`, `rows`, `curve`; raises MissingModel."""
-    with as_file(_place(reaches)) as file:
+    with as_file(_model_file(reaches)) as file:
         return tensors.read_about(file)
 
 
-def digest(reaches: str) -> str:
+def model_digest(reaches: str) -> str:
     """The SHA-256 of the file of the model that ships, hexadecimal; raises MissingModel."""
-    with as_file(_place(reaches)) as file:
+    with as_file(_model_file(reaches)) as file:
         return hashing.sha256(file)
 
 
-def _place(reaches: str) -> Traversable:
+def _model_file(reaches: str) -> Traversable:
     place = files("dextron_bench") / "data" / f"success-{reaches}.safetensors"
     if not place.is_file():
         raise MissingModel(f"no success model ships for {reaches} reaches; `dextron-bench success train` makes one")

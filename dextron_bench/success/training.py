@@ -26,12 +26,12 @@ MEMORY = ("step", "exp_avg", "exp_avg_sq")
 Report = Callable[[int, int, str], None]  # Told (epochs done, epochs in all, how it goes).
 
 
-class BadFit(ValueError):
+class BadTrainingConfig(ValueError):
     """A training that cannot be."""
 
 
 @dataclass(frozen=True)
-class Fit:
+class TrainingConfig:
     """How the model is trained; batch and learning rate are the paper's, which does not say how long an epoch is."""
 
     epochs: int = 30
@@ -45,12 +45,12 @@ class Fit:
 
     def __post_init__(self) -> None:
         if min(self.epochs, self.updates, self.batch, self.halved_every) < 1 or self.learning_rate <= 0.0:
-            raise BadFit("epochs, updates, batch, halving and learning rate of a training are positive")
+            raise BadTrainingConfig("epochs, updates, batch, halving and learning rate of a training are positive")
         if self.seed < 0:
-            raise BadFit(f"the seed of a training is 0 or more, not {self.seed}")
+            raise BadTrainingConfig(f"the seed of a training is 0 or more, not {self.seed}")
 
 
-def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note: None) -> SuccessModel:
+def train(folder: Path, settings: TrainingConfig, report: Report = lambda done, wanted, note: None) -> SuccessModel:
     """Trains on the data set in a folder, or goes on where a training there was stopped; returns the model.
 
     It is that of the epoch with the lowest loss on the episodes held out, since later ones learn theirs by heart and
@@ -71,7 +71,7 @@ def fit(folder: Path, settings: Fit, report: Report = lambda done, wanted, note:
     return SuccessModel(lesson.best)
 
 
-def network(rng: np.random.Generator) -> nn.Sequential:
+def initial_network(rng: np.random.Generator) -> nn.Sequential:
     """New layers, drawn uniformly as PyTorch draws them."""
     (_, wide), (hidden,), _, _, (classes, _), _ = SIZES
     made = nn.Sequential(
@@ -89,14 +89,14 @@ def network(rng: np.random.Generator) -> nn.Sequential:
 class _TrainingRun:
     """A training under way."""
 
-    def __init__(self, folder: Path, settings: Fit) -> None:
+    def __init__(self, folder: Path, settings: TrainingConfig) -> None:
         self._folder, self._settings = folder, settings
         self._data, self._held = Dataset(folder), Dataset(folder, test=True)
         self.epoch, self.curve, self.best = 0, list[dict[str, float]](), dict[str, np.ndarray]()
         states, _, _ = self._data.take(self._rng(1).integers(len(self._data), size=SCALED_BY))
         self._mean = states.mean(axis=0, dtype=np.float64)
         self._deviation = np.sqrt(states.var(axis=0, dtype=np.float64) + 1e-8)
-        self._network = network(self._rng(0))
+        self._network = initial_network(self._rng(0))
         self._parameters = list(self._network.parameters())
         self._optimiser = torch.optim.Adam(self._parameters, lr=settings.learning_rate, fused=True)
         self._loss = nn.CrossEntropyLoss()

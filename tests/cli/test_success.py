@@ -19,8 +19,8 @@ from tests.helpers import tiny_benchmark, tiny_training
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty working folder in the tiny world, with small blocks."""
     tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.setattr(generation.Collection.__init__, "__defaults__", ("synthetic", 0, (), 5))
-    monkeypatch.setattr(training.Fit.__init__, "__defaults__", (30, 2, 8, 1e-3, 100, 0))
+    monkeypatch.setattr(generation.DatasetConfig.__init__, "__defaults__", ("synthetic", 0, (), 5))
+    monkeypatch.setattr(training.TrainingConfig.__init__, "__defaults__", (30, 2, 8, 1e-3, 100, 0))
     monkeypatch.setattr("baselines.bc.STEPS", 2)
     monkeypatch.chdir(tmp_path)
     yield tmp_path

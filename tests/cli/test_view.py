@@ -146,7 +146,7 @@ def test_a_policy_at_work_is_watched(
         yield lambda stream: stream.save(here / "live.rrd"), lambda: 0
 
     monkeypatch.setattr(recording, "open_live_viewer", open_live_viewer)
-    monkeypatch.setattr(network, "shipped", lambda reaches: fixed_success_model.model(0.5))
+    monkeypatch.setattr(network, "shipped_model", lambda reaches: fixed_success_model.model(0.5))
     capsys.readouterr()
     assert main.main(["view", "--live", "--method", "nothing", "--row", "1", "--speed", "0"]) == 0
     assert capsys.readouterr().out == "nothing on row 1 of test: 0 of 20\n"

@@ -20,7 +20,8 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Two runs of two episodes each, in the tiny world: one solves them, the other does not."""
     tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(network, "shipped", lambda reaches: fixed_success_model.model(0.9, slope=-8.0))  # Hopeful.
+    model = fixed_success_model.model(0.9, slope=-8.0)  # It predicts success for most actions.
+    monkeypatch.setattr(network, "shipped_model", lambda reaches: model)
     words = ["--split", "test", "--no-floors", "--quiet", "--json", "--record", "0"]
     for method in ("exp", "nothing"):
         assert main.main(["run", "--method", method, *words]) == 0
@@ -55,7 +56,7 @@ def test_a_method_is_shown_where_it_played_and_without_a_model_there_are_no_case
     def missing(reaches: str) -> object:
         raise network.MissingModel(reaches)
 
-    monkeypatch.setattr(network, "shipped", missing)
+    monkeypatch.setattr(network, "shipped_model", missing)
     chosen = highlights.choose(runs, ["minjerk", "synthetic"], "test", rows=100)
     assert chosen["name"].tolist() == ["exp-success", "nothing-failure"]
     assert set(chosen["reaches"]) == {"synthetic"}

@@ -132,7 +132,7 @@ def test_what_is_no_recording_is_named(file: Path) -> None:
 
 
 def test_a_recording_of_something_else_is_named(file: Path) -> None:
-    rrd_file.save(file, blueprint.lines(), "other", blueprint.blueprint())
+    rrd_file.save(file, blueprint.line_styles(), "other", blueprint.blueprint())
     with pytest.raises(recording.BrokenRecording, match="no digest"):
         recording.read(file)
 
@@ -218,7 +218,7 @@ def test_other_layouts_are_those_of_other_applications(tmp_path: Path) -> None:
     recording.write(
         files[1], episode(2), PATH, {}, StepPredictions(GRID, np.full((2, 51), 0.5), np.zeros(2), np.zeros(2), 2.0)
     )
-    recording.pair(files[2], *files[:2])
+    recording.write_pair(files[2], *files[:2])
     found = [RrdReader(file).recordings()[0].application_id for file in files]
     assert found == ["dextron-bench-plain", "dextron-bench", "dextron-bench-pairs"]
     assert [summary.damage for summary in recording.summarise(files, whole=True)] == ["", "", ""]

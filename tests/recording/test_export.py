@@ -13,7 +13,7 @@ import pytest
 from dextron_bench import recording
 from dextron_bench.recording import export, film
 from dextron_bench.recording.export import UnknownEnding
-from dextron_bench.recording.film import Look
+from dextron_bench.recording.film import FilmStyle
 from dextron_bench.world import model
 from dextron_bench.world.rendering import renderer
 from tests.recording.test_episode_file import PATH, episode
@@ -44,7 +44,7 @@ def test_every_number_of_a_state_has_the_name_of_what_it_is():
 @pytest.mark.parametrize("ending", [".csv", ".parquet", ".CSV"])
 def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, ending: str):
     file = tmp_path / "new" / f"episode{ending}"
-    export.export(recorded, file, Look())
+    export.export(recorded, file, FilmStyle())
     table = pd.read_parquet(file) if ending == ".parquet" else pd.read_csv(file)
     played = recording.read(recorded).episode
     assert list(table.columns) == ["step", "seconds", *model.state_names(), "action", "reward"]
@@ -59,7 +59,7 @@ def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, en
 @pytest.mark.parametrize("ending", [".mp4", ".gif"])
 def test_a_film_is_written_by_its_ending(recorded: Path, tmp_path: Path, ending: str):
     told, file = [], tmp_path / f"film{ending}"
-    export.export(recorded, file, Look(64, 48), lambda *parts: told.append(parts))
+    export.export(recorded, file, FilmStyle(64, 48), lambda *parts: told.append(parts))
     assert told[-1] == ((5, 5) if ending == ".mp4" else (3, 3))
     assert file.read_bytes()[:12].startswith(b"GIF89a" if ending == ".gif" else b"\x00\x00\x00")
     assert os.listdir(tmp_path) == [file.name]
@@ -70,7 +70,7 @@ def test_an_unknown_ending_names_the_known_before_anything_is_read(tmp_path: Pat
         with pytest.raises(
             UnknownEnding, match=r"film.*: cannot export to .*; choose from \.mp4, \.gif, \.csv, \.parquet"
         ):
-            export.export(tmp_path / "none.rrd", tmp_path / name, Look())
+            export.export(tmp_path / "none.rrd", tmp_path / name, FilmStyle())
 
 
 def test_what_fails_half_way_leaves_what_was_there(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -83,7 +83,7 @@ def test_what_fails_half_way_leaves_what_was_there(recorded: Path, tmp_path: Pat
 
     monkeypatch.setitem(export.FILMS, ".gif", full)
     with pytest.raises(OSError, match="No space left"):
-        export.export(recorded, file, Look())
+        export.export(recorded, file, FilmStyle())
     assert (file.read_text(), os.listdir(tmp_path)) == ("before", ["film.gif"])
 
 
@@ -91,7 +91,7 @@ def test_a_damaged_recording_is_not_exported(recorded: Path, tmp_path: Path):
     cut = tmp_path / "cut.rrd"
     cut.write_bytes(recorded.read_bytes()[:-20])
     with pytest.raises(recording.BrokenRecording, match=r"cut\.rrd: is cut short"):
-        export.export(cut, tmp_path / "film.csv", Look())
+        export.export(cut, tmp_path / "film.csv", FilmStyle())
     assert os.listdir(tmp_path) == ["cut.rrd"]
 
 
@@ -100,5 +100,5 @@ def test_the_pictures_of_a_film_are_those_of_stills():
     with renderer.Painter(32, 24, supersampling=2) as painter:
         expected = painter.paint(states[0], renderer.CAMERAS["side"])
     np.testing.assert_array_equal(renderer.frames(states, 32, 24)[0], expected)
-    coarse = next(iter(film._pictures(states, Look(32, 24))))
+    coarse = next(iter(film._pictures(states, FilmStyle(32, 24))))
     assert np.abs(coarse.astype(int) - expected).mean() < 5.0

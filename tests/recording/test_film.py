@@ -12,11 +12,11 @@ import pytest
 from PIL import Image
 
 from dextron_bench.recording import film as recording_film
-from dextron_bench.recording.film import BadLook, Look, NoEncoder
+from dextron_bench.recording.film import BadFilmStyle, FilmStyle, NoEncoder
 from dextron_bench.world import model
 from dextron_bench.world.rendering import renderer
 
-SMALL = Look(64, 48)
+SMALL = FilmStyle(64, 48)
 
 
 def lifting(count: int) -> np.ndarray:
@@ -55,7 +55,7 @@ def pictures(file: Path) -> tuple[list[np.ndarray], float]:
     ],
 )
 def test_a_film_shows_these_steps_at_this_rate(count: int, rate: float, speed: float, shown: list[int], fps: float):
-    assert recording_film.steps(count, rate, speed) == (shown, pytest.approx(fps))
+    assert recording_film.shown_steps(count, rate, speed) == (shown, pytest.approx(fps))
 
 
 @pytest.mark.parametrize(("write", "count"), [(recording_film.mp4, 26), (recording_film.gif, 14)])
@@ -73,7 +73,7 @@ def test_a_film_takes_as_long_as_the_episode_and_shows_it(tmp_path: Path, write:
 
 
 def test_slow_motion_takes_longer(tmp_path: Path):
-    recording_film.gif(tmp_path / "slow.gif", lifting(4), Look(64, 48, speed=0.3), lambda done, total: None)
+    recording_film.gif(tmp_path / "slow.gif", lifting(4), FilmStyle(64, 48, speed=0.3), lambda done, total: None)
     shown, lasts = pictures(tmp_path / "slow.gif")
     assert (len(shown), lasts) == (4, pytest.approx(0.27))  # 4 at 15 a second; a GIF counts hundredths.
 
@@ -89,14 +89,14 @@ def test_slow_motion_takes_longer(tmp_path: Path):
     ],
 )
 def test_a_film_that_cannot_be_is_told(look: dict[str, float], told: str):
-    with pytest.raises(BadLook) as caught:
-        Look(**look)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(BadFilmStyle) as caught:
+        FilmStyle(**look)  # pyright: ignore[reportArgumentType]
     assert str(caught.value).startswith(told)
 
 
 def test_an_unknown_camera_names_the_known():
     with pytest.raises(renderer.UnknownCamera, match="no camera 'left'; choose from behind, front"):
-        Look(camera="left")
+        FilmStyle(camera="left")
 
 
 def test_without_an_encoder_the_line_says_how_to_get_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

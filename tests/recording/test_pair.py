@@ -22,7 +22,7 @@ def recorded(file: Path, place: int, speed: float, method: str) -> Path:
 
 def test_each_side_has_its_own_world_and_lines(tmp_path: Path):
     first, second = recorded(tmp_path / "1.rrd", 0, 0.5, "bc"), recorded(tmp_path / "2.rrd", 0, -0.25, "rl")
-    file = recording.pair(tmp_path / "both.rrd", first, second)
+    file = recording.write_pair(tmp_path / "both.rrd", first, second)
     chunks = RrdReader(file).store().stream().to_chunks()
     actions = {str(c.entity_path): c for c in chunks if str(c.entity_path).endswith("/actions") and not c.is_static}
     for entity, speed in {"/a/episode/actions": 0.5, "/b/episode/actions": -0.25}.items():
@@ -37,5 +37,5 @@ def test_each_side_has_its_own_world_and_lines(tmp_path: Path):
 def test_other_settings_are_not_compared(tmp_path: Path):
     first, second = recorded(tmp_path / "1.rrd", 0, 0.5, "bc"), recorded(tmp_path / "2.rrd", 1, 0.5, "bc")
     with pytest.raises(recording.UnequalSettings, match="take two of the same row"):
-        recording.pair(tmp_path / "both.rrd", first, second)
+        recording.write_pair(tmp_path / "both.rrd", first, second)
     assert not (tmp_path / "both.rrd").exists()

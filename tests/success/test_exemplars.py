@@ -23,8 +23,8 @@ def seen(player: str, cause: str, best: list[float], own: list[float]) -> Predic
     curves[:, -1] = best
     rewards = np.full(steps, 20.0 / steps if cause == "solved" else 0.0)
     episode = Episode(Setting("a", 0, 0, 0), np.zeros((steps + 1, 48)), np.zeros((steps, 1)), rewards, False, True)
-    insight = StepPredictions(GRID, curves, np.array(own), np.zeros(steps), duration=steps)
-    return PredictedEpisode(player, episode, Diagnosis(cause, 0.0), insight)
+    predictions = StepPredictions(GRID, curves, np.array(own), np.zeros(steps), duration=steps)
+    return PredictedEpisode(player, episode, Diagnosis(cause, 0.0), predictions)
 
 
 EXPERT = seen("expert", "solved", [0.9, 0.9], [0.8, 0.9])
@@ -55,9 +55,9 @@ def test_an_episode_is_of_one_kind_and_a_model_that_is_mostly_right_is_not_wrong
 
 
 def test_a_step_is_right_where_the_outcome_is_foretold():
-    assert POLICY.right.tolist() == [False, True]
-    assert FADING.foretold == 1.0
-    assert WRONG.foretold == 0.0
+    assert POLICY.correct.tolist() == [False, True]
+    assert FADING.accuracy == 1.0
+    assert WRONG.accuracy == 0.0
 
 
 def test_the_picture_is_drawn_whatever_the_length(tmp_path: Path):
@@ -66,4 +66,4 @@ def test_the_picture_is_drawn_whatever_the_length(tmp_path: Path):
     assert (tmp_path / "ridges.png").stat().st_size > 10_000
     with pytest.raises(figures.UnknownFormat):
         figures.ridges({"one": EXPERT}, tmp_path / "ridges.txt")
-    assert len(GRID) == EXPERT.insight.curves.shape[1]
+    assert len(GRID) == EXPERT.predictions.curves.shape[1]

@@ -67,7 +67,7 @@ def test_a_viewer_that_is_gone_is_told_before_more_is_played(monkeypatch: pytest
             opened.wait()
             yield opened
 
-    monkeypatch.setattr(viewer, "process", process)
+    monkeypatch.setattr(viewer, "viewer_process", process)
     monkeypatch.setattr(viewer, "address", lambda port, opened: "nowhere")
     with recording.open_live_viewer() as (connect, wait):
         with pytest.raises(recording.ViewerError, match=r"gone .code 3.; nothing more is played"):

@@ -17,20 +17,29 @@ from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.storage import folder_config, tensors
 from dextron_bench.success import metrics
 from dextron_bench.success.dataset import BadDataset, Dataset, EmptyDataset
-from dextron_bench.success.generation import POLICY, SOLVED, UNIFORM, BadCollection, Collection, Tally, collect, draw
-from dextron_bench.success.generation import file_of as block_file
-from dextron_bench.success.network import GRID, SIZES, BadModel, MissingModel, SuccessModel, shipped
-from dextron_bench.success.training import MODEL, STATE, BadFit, Fit, fit
-from dextron_bench.success.training import network as fit_network
+from dextron_bench.success.generation import (
+    POLICY,
+    SOLVED,
+    UNIFORM,
+    BadDatasetConfig,
+    DatasetConfig,
+    Tally,
+    block_file,
+    draw_cases,
+    generate,
+)
+from dextron_bench.success.network import GRID, SIZES, BadModel, MissingModel, SuccessModel, shipped_model
+from dextron_bench.success.training import MODEL, STATE, BadTrainingConfig, TrainingConfig, train
+from dextron_bench.success.training import initial_network as fit_network
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 TRAIN = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
-SMALL = Collection("synthetic", block=5, policies=("nothing",))
-BRIEF = Fit(epochs=2, updates=3, batch=8)
+SMALL = DatasetConfig("synthetic", block=5, policies=("nothing",))
+BRIEF = TrainingConfig(epochs=2, updates=3, batch=8)
 
 
-def gather(folder: Path, rows: int, collection: Collection = SMALL, threads: int = 1) -> dict[str, Tally]:
-    return collect(SOURCE, TRAIN, collection, folder, rows, {"nothing": Nothing().agent(0)}, threads)
+def gather(folder: Path, rows: int, collection: DatasetConfig = SMALL, threads: int = 1) -> dict[str, Tally]:
+    return generate(SOURCE, TRAIN, collection, folder, rows, {"nothing": Nothing().agent(0)}, threads)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -42,14 +51,14 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_kinds_go_round_so_that_half_is_the_experts_and_half_the_policies():
     assert [SMALL.kind(number) for number in range(5)] == [SOLVED, POLICY, UNIFORM, POLICY, SOLVED]
-    assert [Collection().kind(number) for number in range(3)] == [SOLVED, UNIFORM, SOLVED]
-    two = Collection(policies=("a", "b"))
+    assert [DatasetConfig().kind(number) for number in range(3)] == [SOLVED, UNIFORM, SOLVED]
+    two = DatasetConfig(policies=("a", "b"))
     assert [two.player(number) for number in (1, 3, 5, 7)] == ["a", "b", "a", "b"]
 
 
 def test_uniform_episodes_stay_with_the_reaches_of_train_and_draw_anew():
     known = TRAIN[0].setting.reach
-    drawn = draw(SOURCE, TRAIN[:1], Collection(block=40), number=1)
+    drawn = draw_cases(SOURCE, TRAIN[:1], DatasetConfig(block=40), number=1)
     assert {case.setting.reach for case in drawn} == {known}
     assert len({case.setting.offset_x for case in drawn}) == 40
     gains, criticals = zip(*((case.expert.gain, case.expert.critical) for case in drawn), strict=True)
@@ -82,9 +91,9 @@ def test_a_block_holds_what_was_played(tmp_path: Path):
 def test_another_data_set_in_the_folder_is_told(tmp_path: Path):
     gather(tmp_path, 1)
     with pytest.raises(folder_config.FolderMismatch, match="choose another folder"):
-        gather(tmp_path, 1, Collection("synthetic", seed=1, block=5))
-    with pytest.raises(BadCollection, match="at least 5 episodes"):
-        Collection(block=0)
+        gather(tmp_path, 1, DatasetConfig("synthetic", seed=1, block=5))
+    with pytest.raises(BadDatasetConfig, match="at least 5 episodes"):
+        DatasetConfig(block=0)
 
 
 def write(folder: Path, number: int, lengths: list[int], solved: list[int]) -> None:
@@ -147,7 +156,7 @@ def test_a_cut_block_is_no_whole_one_and_no_rows_are_no_data_set(tmp_path: Path)
     file.write_bytes(file.read_bytes()[:-40])
     with pytest.raises(BadDataset, match=r"000000.*remove it"):
         gather(tmp_path, 100_000)
-    with pytest.raises(BadCollection, match="--rows"):
+    with pytest.raises(BadDatasetConfig, match="--rows"):
         gather(tmp_path / "other", 0)
     assert not (tmp_path / "other").exists()
 
@@ -196,7 +205,7 @@ def test_arrays_that_make_no_model_are_told():
     with pytest.raises(BadModel, match=r"they hold 'adam.0.step' too; take its model\.safetensors"):
         SuccessModel(arrays() | {"adam.0.step": np.zeros(1)})
     with pytest.raises(MissingModel, match="no success model ships for minjerk"):
-        shipped("minjerk")
+        shipped_model("minjerk")
 
 
 # Training
@@ -205,34 +214,34 @@ def test_arrays_that_make_no_model_are_told():
 def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
     for folder in ("a", "b", "c"):
         write(tmp_path / folder, 0, [30] * 10, [0, 1] * 5)
-    fit(tmp_path / "a", BRIEF)
-    fit(tmp_path / "c", replace(BRIEF, epochs=1))
-    fit(tmp_path / "c", BRIEF)
+    train(tmp_path / "a", BRIEF)
+    train(tmp_path / "c", replace(BRIEF, epochs=1))
+    train(tmp_path / "c", BRIEF)
     assert contents(tmp_path / "a") == contents(tmp_path / "c")
     with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
-        fit(tmp_path / "c", replace(BRIEF, epochs=1))
+        train(tmp_path / "c", replace(BRIEF, epochs=1))
 
     def stop(done: int, wanted: int, note: str) -> None:
         if done == 1:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        fit(tmp_path / "b", BRIEF, stop)
-    fit(tmp_path / "b", BRIEF)
+        train(tmp_path / "b", BRIEF, stop)
+    train(tmp_path / "b", BRIEF)
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
     told = tensors.read_about(tmp_path / "a" / MODEL)
     assert [point["epoch"] for point in told["curve"]] == [1, 2]
     losses = [point["test_loss"] for point in told["curve"]]
     assert losses[told["best_epoch"] - 1] == min(losses)
     with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
-        fit(tmp_path / "a", Fit(epochs=2, updates=4, batch=8))
-    with pytest.raises(BadFit, match="positive"):
-        Fit(updates=0)
-    with pytest.raises(BadFit, match="0 or more, not -1"):
-        Fit(seed=-1)
+        train(tmp_path / "a", TrainingConfig(epochs=2, updates=4, batch=8))
+    with pytest.raises(BadTrainingConfig, match="positive"):
+        TrainingConfig(updates=0)
+    with pytest.raises(BadTrainingConfig, match="0 or more, not -1"):
+        TrainingConfig(seed=-1)
     shutil.copyfile(tmp_path / "a" / MODEL, tmp_path / "a" / STATE)
     with pytest.raises(tensors.BadTensors, match=r"fit\.safetensors .*no training under way"):
-        fit(tmp_path / "a", BRIEF)
+        train(tmp_path / "a", BRIEF)
 
 
 def test_the_model_is_that_of_the_epoch_with_the_lowest_loss_on_what_was_held_out(tmp_path: Path):
@@ -241,12 +250,12 @@ def test_the_model_is_that_of_the_epoch_with_the_lowest_loss_on_what_was_held_ou
     arrays = {"states": rng.normal(size=(60, 48)).astype(np.float32), "actions": np.zeros(60, np.float32)}
     arrays |= {"starts": np.arange(61), "solved": rng.integers(0, 2, 60).astype(np.uint8)}
     tensors.write(block_file(tmp_path, 0), arrays, {})
-    long, short = (Fit(epochs=epochs, updates=20, batch=32) for epochs in (4, 1))
-    fit(tmp_path, long)
+    long, short = (TrainingConfig(epochs=epochs, updates=20, batch=32) for epochs in (4, 1))
+    train(tmp_path, long)
     assert tensors.read_about(tmp_path / MODEL)["best_epoch"] == 1
     best = tensors.read(tmp_path / MODEL)
     (tmp_path / STATE).unlink()
-    fit(tmp_path, short)
+    train(tmp_path, short)
     for name, array in tensors.read(tmp_path / MODEL).items():
         np.testing.assert_array_equal(array, best[name])
 
@@ -257,7 +266,7 @@ def test_training_learns_what_can_be_learned(tmp_path: Path):
     states = rng.normal(size=(3000, 48)).astype(np.float32)
     arrays = {"states": states, "actions": rng.uniform(-1, 1, 3000).astype(np.float32), "starts": np.arange(3001)}
     tensors.write(block_file(tmp_path, 0), arrays | {"solved": (states[:, 5] > 0).astype(np.uint8)}, {})
-    model = fit(tmp_path, Fit(epochs=1, updates=200, batch=256))
+    model = train(tmp_path, TrainingConfig(epochs=1, updates=200, batch=256))
     probe = np.zeros((2, 48))
     probe[:, 5] = [-1.0, 1.0]
     low, high = model.chance(probe, np.zeros(2))

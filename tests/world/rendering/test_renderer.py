@@ -122,13 +122,13 @@ def test_a_shell_of_equal_circles_holds_the_volume_of_its_prism() -> None:
 
 
 def test_the_pictured_grasp_succeeds() -> None:
-    assert stills.lift().success
+    assert stills.play_lift().success
 
 
 def test_a_pictured_hand_is_as_closed_as_told(start: np.ndarray) -> None:
     joints, closed = model.proximal()
-    np.testing.assert_allclose(stills.hand(start, 0.25)[joints], closed / 4)
-    np.testing.assert_array_equal(stills.hand(start, model.HALF_CLOSED)[14:], start[14:])
+    np.testing.assert_allclose(stills.hand_alone(start, 0.25)[joints], closed / 4)
+    np.testing.assert_array_equal(stills.hand_alone(start, model.HALF_CLOSED)[14:], start[14:])
 
 
 @pytest.mark.slow
