@@ -1,13 +1,9 @@
-"""The authors' release where it is at hand, and a tiny one of the same shape where it is not."""
+"""Fixtures of many tests: the authors' release, a small one of the same form, bundles, a browser."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
-import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,22 +14,21 @@ from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
 from tests.helpers import forged_bundles
 from tests.helpers.browser import open_browser
+from tests.helpers.small_release import SmallRelease, make_small_release
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes would otherwise take every core.
 
 BESIDE = Path(__file__).parents[2] / "shared" / "data" / "dextron-a101b9e-extracts.zip"
-NAMES = ("01_fl_01", "01_fl_06", "02_nr_16")
-START = 3.5  # [s] first sample on the recorder's clock.
 
 
 @pytest.fixture(scope="session")
 def release() -> Path:
-    """The authors' release, as DEXTRON_DATA names it or as it lies beside the checkout; skips where absent."""
+    """The path of the authors' release: DEXTRON_DATA, else beside the checkout. Skips the test if there is none."""
     named = os.environ.get("DEXTRON_DATA")
-    found = Path(named) if named else BESIDE
-    if not found.exists():
-        pytest.skip("the authors' release is not here: set DEXTRON_DATA to its zip or folder")
-    return found
+    path = Path(named) if named else BESIDE
+    if not path.exists():
+        pytest.skip("the authors' release is missing: set DEXTRON_DATA to its zip or folder")
+    return path
 
 
 @pytest.fixture
@@ -48,49 +43,10 @@ def opened(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> C
     return opened
 
 
-@dataclass(frozen=True)
-class Published:
-    """A release of three made-up reaches: file contents by name from `extracts/` on, and where its files go."""
-
-    files: dict[str, bytes]
-    folder: Path
-
-    @property
-    def manifest(self) -> Path:
-        """The manifest file of the undamaged release."""
-        return self.folder / "manifest.json"
-
-    def zip(self, changed: dict[str, bytes] | None = None, top: str = "dextron-abc/data/") -> Path:
-        """Writes the release as a zip, with some contents changed or added."""
-        where = self.folder / "release.zip"
-        with zipfile.ZipFile(where, "w", zipfile.ZIP_DEFLATED) as archive:
-            for file, content in {**self.files, **(changed or {})}.items():
-                archive.writestr(top + file, content)
-        return where
-
-    def unpacked(self) -> Path:
-        """Writes the release as a folder and returns its top."""
-        top = self.folder / "dextron-abc"
-        for file, content in self.files.items():
-            place = top / "data" / file
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content)
-        return top
-
-
 @pytest.fixture
-def published(tmp_path: Path) -> Published:
-    """A made-up release: each reach has six samples 0.1 s apart, moving 0.1 m along x, `reached` after 0.3 s."""
-    rows = [{"q": [1.0, 0.0, 0.0, 0.0], "x": [-0.5 + 0.1 * i, -0.2, -0.1], "t": START + 0.1 * i} for i in range(6)]
-    samples = "".join(json.dumps(row) + "\n" for row in rows).encode()
-    notes = json.dumps([["start", START], ["reached", START + 0.3], ["top", START + 0.5]]).encode()
-    files = {f"extracts/{name}.json": samples for name in NAMES}
-    files |= {f"extracts/meta/{name}_meta.json": notes for name in NAMES}
-    made = Published(files, tmp_path / "published")
-    made.folder.mkdir()
-    hashes = {file: hashlib.sha256(content).hexdigest() for file, content in files.items()}
-    made.manifest.write_text(json.dumps({"files": hashes}))
-    return made
+def small_release(tmp_path: Path) -> SmallRelease:
+    """A made-up release of three reaches."""
+    return make_small_release(tmp_path)
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.recorded import release
-from tests.conftest import Published
+from tests.helpers.small_release import SmallRelease
 
 FILE, NOTES = "extracts/01_fl_06.json", "extracts/meta/01_fl_06_meta.json"
 INJECT = """
@@ -27,11 +27,11 @@ sys.exit(main())
 """  # The command line, checking against another manifest than the shipped one.
 
 
-def run(published: Published, *words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(small_release: SmallRelease, *words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Runs the command line in a process of its own, with an empty cache unless told otherwise."""
     inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
-    cache = {"DEXTRON_CACHE": str(published.folder / "cache")}
-    command = [sys.executable, "-c", INJECT, str(published.manifest), *map(str, words)]
+    cache = {"DEXTRON_CACHE": str(small_release.folder / "cache")}
+    command = [sys.executable, "-c", INJECT, str(small_release.manifest), *map(str, words)]
     return subprocess.run(
         command, env={**inherited, **cache, **environment}, capture_output=True, text=True, timeout=120
     )
@@ -51,11 +51,11 @@ def with_line(content: bytes, number: int, line: bytes) -> bytes:
     return b"".join(lines)
 
 
-def test_import_then_info(published: Published):
-    done = run(published, "data", "import", "--from", published.zip())
+def test_import_then_info(small_release: SmallRelease):
+    done = run(small_release, "data", "import", "--from", small_release.zip())
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("3 reaches imported into ")
-    done = run(published, "data", "info", "--json")
+    done = run(small_release, "data", "info", "--json")
     groups = json.loads(done.stdout)
     assert [(g["subject"], g["ring"], g["angle"], g["reaches"]) for g in groups] == [
         *(("01", 0, 0, 1), ("01", 1, 1, 1), ("02", 3, 3, 1))
@@ -81,34 +81,34 @@ QUICK = ("truncated", "value")  # The rest wait for `make check`: each starts a 
 
 
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=[] if k in QUICK else pytest.mark.slow) for k in DAMAGE])
-def test_damage_is_one_line_with_file_and_place(published: Published, kind: str):
+def test_damage_is_one_line_with_file_and_place(small_release: SmallRelease, kind: str):
     file, damage, expected = DAMAGE[kind]
-    where = published.zip({file: damage(published.files[file])})
-    assert expected in complaint(run(published, "data", "import", "--from", where))
-    assert not (published.folder / "cache").exists()
+    where = small_release.zip({file: damage(small_release.files[file])})
+    assert expected in complaint(run(small_release, "data", "import", "--from", where))
+    assert not (small_release.folder / "cache").exists()
 
 
-def test_info_without_reaches_says_how_to_get_them(published: Published):
-    line = complaint(run(published, "data", "info"))
+def test_info_without_reaches_says_how_to_get_them(small_release: SmallRelease):
+    line = complaint(run(small_release, "data", "info"))
     assert "data import --from" in line
     assert "data fetch" in line
 
 
-def test_info_reads_what_the_environment_names(published: Published):
-    done = run(published, "data", "info", DEXTRON_DATA=str(published.zip()))
+def test_info_reads_what_the_environment_names(small_release: SmallRelease):
+    done = run(small_release, "data", "info", DEXTRON_DATA=str(small_release.zip()))
     assert (done.returncode, done.stderr) == (0, "")
     assert "3 real reaches by subject" in done.stdout
 
 
-def test_fetch_without_network_names_the_other_way(published: Published):
-    line = complaint(run(published, "data", "fetch", https_proxy="http://127.0.0.1:9", no_proxy=""))
+def test_fetch_without_network_names_the_other_way(small_release: SmallRelease):
+    line = complaint(run(small_release, "data", "fetch", https_proxy="http://127.0.0.1:9", no_proxy=""))
     assert "cannot download https://github.com/" in line
     assert "data import --from" in line
 
 
-def test_a_cache_that_cannot_be_made_is_one_line(published: Published):
-    blocked = str(published.manifest / "cache")
-    line = complaint(run(published, "data", "import", "--from", published.zip(), DEXTRON_CACHE=blocked))
+def test_a_cache_that_cannot_be_made_is_one_line(small_release: SmallRelease):
+    blocked = str(small_release.manifest / "cache")
+    line = complaint(run(small_release, "data", "import", "--from", small_release.zip(), DEXTRON_CACHE=blocked))
     assert "Not a directory" in line
     assert blocked in line
 
@@ -146,10 +146,10 @@ def test_help_imports_nothing_heavy():
     assert not {"torch", "mujoco", "scipy", "pandas", "matplotlib", "rerun", "pyarrow"} & set(loaded)
 
 
-def test_a_reader_that_stops_early_is_no_error(published: Published):
-    run(published, "data", "import", "--from", published.zip())
-    command = [sys.executable, "-c", INJECT, str(published.manifest), "data", "info"]
-    environment = {**os.environ, "DEXTRON_CACHE": str(published.folder / "cache")}
+def test_a_reader_that_stops_early_is_no_error(small_release: SmallRelease):
+    run(small_release, "data", "import", "--from", small_release.zip())
+    command = [sys.executable, "-c", INJECT, str(small_release.manifest), "data", "info"]
+    environment = {**os.environ, "DEXTRON_CACHE": str(small_release.folder / "cache")}
     pipe = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert pipe.stdout is not None
     pipe.stdout.close()
@@ -184,11 +184,11 @@ def test_every_end_has_its_code(
     assert capsys.readouterr().err.startswith(f"dextron-bench: {line}")
 
 
-def test_picture_of_a_source(published: Published, tmp_path: Path):
+def test_picture_of_a_source(small_release: SmallRelease, tmp_path: Path):
     from dextron_bench.reaches.setting import ReachSource
     from dextron_bench.scores.figures import UnknownFormat, reach_paths
 
-    reaches = release.read(published.zip(), release.Manifest.load(published.manifest))
+    reaches = release.read(small_release.zip(), release.Manifest.load(small_release.manifest))
     reach_paths(ReachSource("real", reaches), tmp_path / "reaches.png")
     assert (tmp_path / "reaches.png").read_bytes().startswith(b"\x89PNG")
     with pytest.raises(UnknownFormat, match=r"choose from \.pdf, \.png, \.svg"):

@@ -13,7 +13,7 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.recorded.release import Manifest
-from tests.conftest import NAMES, Published
+from tests.helpers.small_release import NAMES, SmallRelease
 
 
 @pytest.fixture(autouse=True)
@@ -32,31 +32,33 @@ def same(a: list[Reach], b: list[Reach]) -> bool:
     return [parts(reach) for reach in a] == [parts(reach) for reach in b]
 
 
-def test_what_was_imported_comes_back_bit_for_bit(published: Published):
-    manifest = Manifest.load(published.manifest)
-    imported = recorded_cache.import_release(published.zip(), manifest)
+def test_what_was_imported_comes_back_bit_for_bit(small_release: SmallRelease):
+    manifest = Manifest.load(small_release.manifest)
+    imported = recorded_cache.import_release(small_release.zip(), manifest)
     assert same(imported, recorded_cache.load_reaches(manifest))
 
 
-def test_nothing_anywhere_says_how_to_get_it(published: Published):
+def test_nothing_anywhere_says_how_to_get_it(small_release: SmallRelease):
     with pytest.raises(recorded_cache.MissingData, match=r"data import --from .*data fetch"):
-        recorded_cache.load_reaches(Manifest.load(published.manifest))
+        recorded_cache.load_reaches(Manifest.load(small_release.manifest))
 
 
-def test_the_environment_names_a_release_where_no_cache_is(published: Published, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("DEXTRON_DATA", str(published.unpacked()))
-    assert [reach.name for reach in recorded_cache.load_reaches(Manifest.load(published.manifest))] == list(NAMES)
+def test_the_environment_names_a_release_where_no_cache_is(
+    small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("DEXTRON_DATA", str(small_release.unpacked()))
+    assert [reach.name for reach in recorded_cache.load_reaches(Manifest.load(small_release.manifest))] == list(NAMES)
 
 
-def test_a_cache_of_another_release_does_not_count(published: Published):
-    recorded_cache.import_release(published.zip(), Manifest.load(published.manifest))
+def test_a_cache_of_another_release_does_not_count(small_release: SmallRelease):
+    recorded_cache.import_release(small_release.zip(), Manifest.load(small_release.manifest))
     with pytest.raises(recorded_cache.MissingData, match="from another release"):
         recorded_cache.load_reaches(Manifest.load())
 
 
-def test_a_changed_cache_does_not_count(published: Published):
-    manifest = Manifest.load(published.manifest)
-    recorded_cache.import_release(published.zip(), manifest)
+def test_a_changed_cache_does_not_count(small_release: SmallRelease):
+    manifest = Manifest.load(small_release.manifest)
+    recorded_cache.import_release(small_release.zip(), manifest)
     with np.load(recorded_cache.cache_file()) as stored:
         columns = dict(stored)
     columns["positions"][0, 0] += 1e-9
@@ -67,18 +69,20 @@ def test_a_changed_cache_does_not_count(published: Published):
 
 
 @pytest.mark.parametrize("size", [0, 10, 400, 2000])
-def test_a_cut_cache_does_not_count(published: Published, size: int):
-    manifest = Manifest.load(published.manifest)
-    recorded_cache.import_release(published.zip(), manifest)
+def test_a_cut_cache_does_not_count(small_release: SmallRelease, size: int):
+    manifest = Manifest.load(small_release.manifest)
+    recorded_cache.import_release(small_release.zip(), manifest)
     recorded_cache.cache_file().write_bytes(recorded_cache.cache_file().read_bytes()[:size])
     with pytest.raises(recorded_cache.MissingData, match="cannot be read"):
         recorded_cache.load_reaches(manifest)
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_failed_write_leaves_the_cache_as_it_was(published: Published, monkeypatch: pytest.MonkeyPatch, call: str):
-    manifest = Manifest.load(published.manifest)
-    recorded_cache.import_release(published.zip(), manifest)
+def test_a_failed_write_leaves_the_cache_as_it_was(
+    small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch, call: str
+):
+    manifest = Manifest.load(small_release.manifest)
+    recorded_cache.import_release(small_release.zip(), manifest)
     before = recorded_cache.cache_file().read_bytes()
 
     def full(*_: object) -> None:
@@ -86,7 +90,7 @@ def test_a_failed_write_leaves_the_cache_as_it_was(published: Published, monkeyp
 
     monkeypatch.setattr(os, call, full)
     with pytest.raises(OSError, match="No space left"):
-        recorded_cache.import_release(published.zip(), manifest)
+        recorded_cache.import_release(small_release.zip(), manifest)
     assert recorded_cache.cache_file().read_bytes() == before
     assert os.listdir(recorded_cache.cache_folder()) == [recorded_cache.CACHE_FILE]
 

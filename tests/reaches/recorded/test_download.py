@@ -10,7 +10,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import pytest
 
 from dextron_bench.reaches.recorded import cache, download, release
-from tests.conftest import Published
+from tests.helpers.small_release import SmallRelease
 
 
 class Server(BaseHTTPRequestHandler):
@@ -29,10 +29,10 @@ class Server(BaseHTTPRequestHandler):
 
 
 @pytest.fixture
-def site(published: Published, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    monkeypatch.setenv("DEXTRON_CACHE", str(published.folder / "cache"))
+def site(small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    monkeypatch.setenv("DEXTRON_CACHE", str(small_release.folder / "cache"))
     monkeypatch.setenv("no_proxy", "127.0.0.1")
-    monkeypatch.setattr(Server, "content", published.zip().read_bytes())
+    monkeypatch.setattr(Server, "content", small_release.zip().read_bytes())
     server = HTTPServer(("127.0.0.1", 0), Server)
     thread = threading.Thread(target=server.serve_forever)
     thread.start()
@@ -42,9 +42,9 @@ def site(published: Published, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]
     server.server_close()
 
 
-def test_fetch_imports_what_it_downloads(published: Published, site: str):
+def test_fetch_imports_what_it_downloads(small_release: SmallRelease, site: str):
     heard: list[tuple[int, int]] = []
-    manifest = release.Manifest.load(published.manifest)
+    manifest = release.Manifest.load(small_release.manifest)
     fetched = download.fetch(manifest, lambda done, total: heard.append((done, total)), url=f"{site}/release.zip")
     assert len(fetched) == 3 == len(cache.load_reaches(manifest))
     assert heard[-1] == (len(Server.content), len(Server.content))

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dextron_bench.reaches.recorded import parsing
-from tests.conftest import START, Published
+from tests.helpers.small_release import START, SmallRelease
 
 FILE, NOTES = "extracts/01_fl_06.json", "extracts/meta/01_fl_06_meta.json"
 GOOD = [["start", 0.0], ["reached", 1.0], ["top", 2.0]]
@@ -29,22 +29,22 @@ def line(t: Any = 1.0, x: Any = (0.0, 0.0, 0.0), q: Any = (1.0, 0.0, 0.0, 0.0)) 
     return json.dumps({"t": t, "x": x, "q": q})
 
 
-def test_parse_zeroes_the_clock_and_lifts_to_the_table(published: Published):
-    reach = parsing.parse("01_fl_06", published.files[FILE], published.files[NOTES])
+def test_parse_zeroes_the_clock_and_lifts_to_the_table(small_release: SmallRelease):
+    reach = parsing.parse("01_fl_06", small_release.files[FILE], small_release.files[NOTES])
     np.testing.assert_allclose(reach.times, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5], atol=1e-12)
     np.testing.assert_allclose(reach.positions[0], [-0.5, -0.2, 0.1])  # -0.1 m above a plane 0.2 m up.
     assert reach.reached == pytest.approx(0.3)
     assert (reach.subject, reach.ring, reach.angle) == ("01", 1, 1)
 
 
-def test_reached_counts_from_the_first_sample_not_from_the_start_annotation(published: Published):
+def test_reached_counts_from_the_first_sample_not_from_the_start_annotation(small_release: SmallRelease):
     notes = json.dumps([["start", START - 0.2], ["reached", START + 0.4], ["top", START + 0.5]]).encode()
-    assert parsing.parse("01_fl_06", published.files[FILE], notes).reached == pytest.approx(0.4)
+    assert parsing.parse("01_fl_06", small_release.files[FILE], notes).reached == pytest.approx(0.4)
 
 
-def test_a_sample_sent_twice_is_one(published: Published):
-    lines = published.files[FILE].splitlines(keepends=True)
-    reach = parsing.parse("01_fl_06", b"".join([*lines[:2], lines[1], *lines[2:]]), published.files[NOTES])
+def test_a_sample_sent_twice_is_one(small_release: SmallRelease):
+    lines = small_release.files[FILE].splitlines(keepends=True)
+    reach = parsing.parse("01_fl_06", b"".join([*lines[:2], lines[1], *lines[2:]]), small_release.files[NOTES])
     assert len(reach.times) == 6
 
 
@@ -116,16 +116,16 @@ def test_a_later_rest_may_be_there_twice():
     assert parsing.read_annotations(NOTES, notes)["reached"] == 1.0
 
 
-def test_reached_outside_the_recording_is_an_error(published: Published):
+def test_reached_outside_the_recording_is_an_error(small_release: SmallRelease):
     notes = json.dumps([["start", START], ["reached", START + 0.6], ["top", START + 0.7]]).encode()
     with pytest.raises(parsing.RawError, match=r"'reached' is outside the recording, 0\.600 s"):
-        parsing.parse("01_fl_06", published.files[FILE], notes)
+        parsing.parse("01_fl_06", small_release.files[FILE], notes)
 
 
-def test_too_few_samples_are_an_error(published: Published):
-    three = b"".join(published.files[FILE].splitlines(keepends=True)[:3])
+def test_too_few_samples_are_an_error(small_release: SmallRelease):
+    three = b"".join(small_release.files[FILE].splitlines(keepends=True)[:3])
     with pytest.raises(parsing.RawError, match="has 3 samples"):
-        parsing.parse("01_fl_06", three, published.files[NOTES])
+        parsing.parse("01_fl_06", three, small_release.files[NOTES])
 
 
 @given(st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 4), min_size=1, max_size=20))
