@@ -49,8 +49,9 @@ class Search:
 
     @property
     def label(self) -> str:
-        """The name of its runs, which tells settings apart."""
-        return self.name if self == Search() else f"{self.name}-{self.preset}-{self.candidates}x{self.episodes}"
+        """The name of its runs; it distinguishes settings."""
+        size = "" if (self.candidates, self.episodes) == (16, 32) else f"-{self.candidates}x{self.episodes}"
+        return self.name + size + ("" if self.preset == "full" else f"-{self.preset}")
 
     @property
     def epochs(self) -> int:
