@@ -83,8 +83,10 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     while sources:
         source, text = sources.pop()
         for target in linked_files(source, text):
+            if target.is_relative_to(docs) or not target.is_relative_to(docs.parent):
+                continue
             uri = site_uri(target, docs)
-            if target.is_relative_to(docs) or files.get_file_from_path(uri):
+            if files.get_file_from_path(uri):
                 continue
             content = page_of(target)
             if content is None:
@@ -117,7 +119,7 @@ def redirected(text: str, source: Path, uri: str, docs: Path) -> str:
 
     def redirect(match: re.Match[str]) -> str:
         target = (source.parent / unquote(match[2])).resolve()
-        if not target.exists():
+        if not target.exists() or not target.is_relative_to(docs.parent):
             return match[0]  # MkDocs warns of it.
         return match[1] + posixpath.relpath(site_uri(target, docs), posixpath.dirname(uri))
 
