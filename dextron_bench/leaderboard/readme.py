@@ -1,22 +1,22 @@
-"""The leaderboard's tables in Markdown."""
+"""Writes the leaderboard's tables as Markdown into its README."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.scores import cells
 from dextron_bench.splits.loading import SPLIT_NAMES
 from dextron_bench.storage import atomic
 
 BEGIN, END = "<!-- made by `dextron-bench leaderboard build`: -->", "<!-- end of what was made -->"
 
 
-def _insert(file: Path, text: str) -> None:
-    """Puts text between the marks of a file, which is made where it is not there."""
+def insert(file: Path, text: str) -> None:
+    """Replaces the text between the two marks of a file; creates the file if it does not exist."""
     old = file.read_text(encoding="utf-8") if file.exists() else f"# Leaderboard\n\n{BEGIN}\n{END}\n"
     before, _, rest = old.partition(BEGIN)
     after = rest.partition(END)[2] or "\n"
@@ -24,45 +24,49 @@ def _insert(file: Path, text: str) -> None:
     atomic.write_atomically(file, lambda part: part.write_text(new, encoding="utf-8"))
 
 
-def _picture(reaches: str) -> str:
-    """The file of a source's learning curves."""
+def picture(reaches: str) -> str:
+    """Name of the picture with the learning curves of a source of reaches."""
     return f"curves-{reaches}.png"
 
 
-def _sections(rows: pd.DataFrame, drawn: set[str]) -> Iterator[str]:
-    """The README's tables, as Markdown: for each source, scores on every split, then how episodes of `test` end.
+def sections(rows: pd.DataFrame, with_curves: set[str]) -> Iterator[str]:
+    """The README's lines for each source of reaches: a table of scores, the learning curves, a table of endings.
 
-    Ranks are those on `test`. Sources in `drawn` have a picture of learning curves.
+    Methods are in the order of their return on `test`, and ranks are the ranks on `test`. Only the sources in
+    `with_curves` have a picture of learning curves.
     """
-    for reaches, group in rows.groupby("reaches", sort=False):
-        names = [name for name in SPLIT_NAMES if name in set(group["split"])]
-        ranked = group[group["split"] == "test"]["method"].tolist()
-        yield f"\n## {reaches} reaches\nMean return of 20 with its 95 % interval, and successes [%].\n"
-        yield _line(["rank", "method", "seeds", "tier", *(f"`{name}`" for name in names)])
-        yield _line(["---"] * (4 + len(names)))
-        for method in ranked:
-            own = group[group["method"] == method].set_index("split")
-            rank, (seeds, tier) = own["rank"].loc["test"], own[["seeds", "tier"]].iloc[0]
-            cells = [f"{rank:.0f}".replace("nan", ""), f"`{method}`", seeds, tier]
-            yield _line([*cells, *(_score(own, name) for name in names)])
-        if reaches in drawn:
-            yield f"\n![Learning curves on {reaches} reaches]({_picture(str(reaches))})"
-        yield "\nHow episodes of `test` end [%] ([docs/diagnosis.md](../docs/diagnosis.md)); closing lag in seconds.\n"
-        yield _line(["method", *CAUSES, "closing lag"])
-        yield _line(["---", *["---:"] * (len(CAUSES) + 1)])
-        for row in group[group["split"] == "test"].to_dict("records"):
-            shares = [f"{100 * row[cause] / row['episodes']:.1f}" for cause in CAUSES]
-            lag = "" if pd.isna(row["closing_lag"]) else f"{row['closing_lag']:.2f}"
-            yield _line([f"`{row['method']}`", *shares, lag])
+    for source, group in rows.groupby("reaches", sort=False):
+        yield from _scores(str(source), group)
+        if source in with_curves:
+            yield f"\n![Learning curves on {source} reaches]({picture(str(source))})"
+        yield from _endings(group[group["split"] == "test"])
 
 
-def _score(own: pd.DataFrame, split: str) -> str:
-    if split not in own.index:
-        return ""
-    row = own.loc[split]
-    low, high = f"{row['return_low']:.2f}", f"{row['return_high']:.2f}"
-    return f"{row['return']:.2f} [{low}, {high}], {100 * row['success']:.1f} %"
+def _scores(source: str, rows: pd.DataFrame) -> Iterator[str]:
+    """Returns and successes on every split, a line for each method."""
+    splits = [name for name in SPLIT_NAMES if name in set(rows["split"])]
+    yield f"\n## {source} reaches\nMean return of 20 with its 95 % interval, and successes [%].\n"
+    yield _line(["rank", "method", "seeds", "tier", *(f"`{name}`" for name in splits)])
+    yield _line(["---"] * (4 + len(splits)))
+    for method in rows[rows["split"] == "test"]["method"]:
+        by_split = {row["split"]: row for row in rows[rows["method"] == method].to_dict("records")}
+        first = next(iter(by_split.values()))
+        scores = (_score(by_split[name]) if name in by_split else "" for name in splits)
+        yield _line([cells.rank(by_split["test"]), f"`{method}`", first["seeds"], first["tier"], *scores])
 
 
-def _line(cells: list[Any]) -> str:
-    return "| " + " | ".join(map(str, cells)) + " |"
+def _endings(rows: pd.DataFrame) -> Iterator[str]:
+    """How episodes end, a line for each method."""
+    yield "\nHow episodes of `test` end [%] ([docs/diagnosis.md](../docs/diagnosis.md)); closing lag in seconds.\n"
+    yield _line(["method", *CAUSES, "closing lag"])
+    yield _line(["---", *["---:"] * (len(CAUSES) + 1)])
+    for row in rows.to_dict("records"):
+        yield _line([f"`{row['method']}`", *cells.cause_shares(row), cells.closing_lag(row)])
+
+
+def _score(row: cells.Row) -> str:
+    return f"{cells.mean_return(row)}, {cells.success(row).value} %"
+
+
+def _line(values: Iterable[object]) -> str:
+    return "| " + " | ".join(map(str, values)) + " |"

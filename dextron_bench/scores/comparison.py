@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from dextron_bench.runs.result_files import Results
 from dextron_bench.scores import paired
 from dextron_bench.splits import strata
 from dextron_bench.world import task
 
 ALL = "all"  # The group of all settings.
+Results = Sequence[dict[str, Any]]  # Contents of `result.json`, one for each seed.
 
 
 class Incomparable(ValueError):
@@ -51,7 +51,7 @@ class Comparison:
 
 def compare(a: SeedScores, b: SeedScores) -> Comparison:
     """Compares two methods that `align` put on the same settings. Raises DamagedSplit."""
-    rows = strata.shipped(a.reaches, a.split, a.digest)
+    rows = strata.shipped_strata(a.reaches, a.split, a.digest)
     solved_a, solved_b = a.scores == task.SUCCESS, b.scores == task.SUCCESS
     flips = paired.flips(solved_a, solved_b)
     return Comparison(

@@ -69,7 +69,7 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
     settings = statistics.draw_counts(lengths.pop(), np.random.default_rng(0))
     ranked = [method for method in scores if is_ranked(method, reaches)]
     ranks = dict(zip(ranked, paired.ranks([scores[method] for method in ranked]), strict=True))
-    regions = strata.regions(reaches, split, digest)
+    regions = strata.start_regions(reaches, split, digest)
     ceiling = next((scores[method].mean() for method in registry.CEILINGS if method in scores), np.nan)
     for method, returns in scores.items():
         yield {

@@ -1,4 +1,4 @@
-"""The leaderboard's page: one HTML file with all that it shows, made from results alone."""
+"""The leaderboard's page: one HTML file, computed from results."""
 
 from dextron_bench.leaderboard.page.document import FILE, document
 

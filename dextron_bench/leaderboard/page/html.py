@@ -1,14 +1,14 @@
-"""HTML that is safe by construction: whatever is text is escaped, since names of methods come from strangers."""
+"""Builds HTML and escapes all text, because names of methods come from strangers."""
 
 from __future__ import annotations
 
 from html import escape
 
-VOID = {"line", "rect"}  # Of SVG, whose elements need an end; the page has none of HTML's.
+VOID = {"line", "rect"}  # Elements of SVG that are written without an end tag.
 
 
 class Html(str):
-    """Text that is HTML already."""
+    """Text that is already HTML and is not escaped again."""
 
 
 Content = str | int | float | None
@@ -16,17 +16,17 @@ UNKNOWN = "\N{EN DASH}"
 
 
 def tag(name: str, /, *contents: Content, **attributes: Content) -> Html:
-    """An element. Contents that are not Html are escaped and None is nothing; so are attributes, "" for a bare one.
+    """An element. Contents that are not Html are escaped and None is left out, also in attributes; "" is a bare one.
 
-    A trailing underscore of an attribute's name is dropped (`class_`), others are hyphens (`data_value`).
+    A trailing underscore of an attribute's name is dropped (`class_`), other underscores become hyphens (`data_value`).
     """
-    words = " ".join([name, *(_attribute(key, value) for key, value in attributes.items() if value is not None)])
-    return Html(f"<{words}/>" if name in VOID else f"<{words}>{join(*contents)}</{name}>")
+    start = " ".join([name, *(_attribute(key, value) for key, value in attributes.items() if value is not None)])
+    return Html(f"<{start}/>" if name in VOID else f"<{start}>{join(*contents)}</{name}>")
 
 
 def join(*contents: Content) -> Html:
-    """Contents one after the other."""
-    return Html("".join(each if isinstance(each, Html) else escape(str(each)) for each in contents if each is not None))
+    """Concatenates contents: escapes those that are not Html and leaves out None."""
+    return Html("".join(part if isinstance(part, Html) else escape(str(part)) for part in contents if part is not None))
 
 
 def _attribute(key: str, value: Content) -> str:
