@@ -42,7 +42,7 @@ class Bc(Scheduled):
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """One network a seed, side by side."""
         schedule = SCHEDULES[self.preset]
-        return Cloning(demonstrations.of(track, schedule.episodes), seeds, track.device)
+        return Cloning(demonstrations.load(track, schedule.episodes), seeds, track.device)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
         """Plays the network's output."""

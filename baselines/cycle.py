@@ -42,7 +42,7 @@ class Cycle:
         self._score = np.zeros(agents)
         self._lived: list[tuple[Transitions, np.ndarray]] = []
         if demonstrated:
-            self._demos = demonstrations.of(track, schedule.episodes)
+            self._demos = demonstrations.load(track, schedule.episodes)
             length = schedule.epochs * FRAMES
             self._stream = np.stack([self._demos.stream(self._rng(seed, DEMONSTRATIONS), length) for seed in seeds])
         self._now = self._begin(self._ids)

@@ -46,7 +46,7 @@ class Demonstrations:
         return (begins + np.arange(len(begins)))[:length].astype(np.int32)
 
 
-def of(track: Track, episodes: int | None = None) -> Demonstrations:
+def load(track: Track, episodes: int | None = None) -> Demonstrations:
     """The experts' episodes in the first so many cases of a track (all by default), played or from the cache."""
     cases = track.cases[:episodes]
     file = track.cache / f"demonstrations-{_digest(cases)[:16]}.safetensors"

@@ -44,9 +44,9 @@ class Check:
     def __call__(self) -> int:
         from dextron_bench.leaderboard.submission import conformance, entry
         from dextron_bench.methods.isolation.isolated_agent import Limits
-        from dextron_bench.methods.isolation.launch import launch
+        from dextron_bench.methods.isolation.launch import prepare_launch
 
-        how = launch(self.agent, entry.settle(self.agent, self.settings, self.reaches), self.weights)
+        how = prepare_launch(self.agent, entry.settle(self.agent, self.settings, self.reaches), self.weights)
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
         found = []
         for check in conformance.checks(how, self.reaches, limits, self.threads):

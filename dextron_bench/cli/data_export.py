@@ -71,6 +71,6 @@ class Export:
         if not self.weights:
             return [minari_export.Player("expert", ExpertAgent())]
         return [
-            minari_export.Player(str(file), methods_weights.own(file), methods_weights.about(file))
+            minari_export.Player(str(file), methods_weights.load_agent_from_file(file), methods_weights.metadata(file))
             for file in self.weights
         ]

@@ -54,7 +54,7 @@ class Figures:
         from dextron_bench.splits import building
 
         source = open_source(self.reaches)
-        solved = database.shipped(self.reaches)[0].query("score == 20")
+        solved = database.load_shipped(self.reaches)[0].query("score == 20")
         solved = solved.drop_duplicates(building.SETTING).head(self.rows)
         figures.start_points(source, solved, self._file("fig3a"))
         yield self._file("fig3a")
@@ -84,8 +84,8 @@ class Figures:
 
         figures.success_curve(network.training_info(self.reaches)["curve"], self._file("fig4b"))
         yield self._file("fig4b")
-        files = [file for file in weights.everything(self.reaches) if file.stem == "seed0"]
-        policies = {file.parts[-3]: weights.own(file) for file in files}
+        files = [file for file in weights.all_shipped(self.reaches) if file.stem == "seed0"]
+        policies = {file.parts[-3]: weights.load_agent_from_file(file) for file in files}
         model, cases = network.shipped_model(self.reaches), load_split(self.reaches, "test").cases[: self.settings]
         seen = exemplars.play_and_predict(model, open_source(self.reaches), cases, policies, self.threads)
         chosen = exemplars.choose(seen)

@@ -24,13 +24,13 @@ class List:
         from dextron_bench.splits.loading import all_splits, load_split
         from dextron_bench.training import jobs
 
-        about = [(name, registry.describe(name)) for name in registry.known()]
+        about = [(name, registry.describe(name)) for name in registry.installed_methods()]
         found = [load_split(*names) for names in all_splits()]
         rows = [(split.reaches, split.name, len(split.cases), split.digest[:8]) for split in found]
         print_table("methods", ["name", "what it is"], about)
         print_table("splits", ["reaches", "split", "rows", "version"], rows)
         done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in result_files.results(self.runs)]
-        under_way = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in jobs.under_way(self.runs)]
+        under_way = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in jobs.unfinished(self.runs)]
         if under_way:
             print_table(f"trainings in {self.runs}", ["method", "reaches", "seeds", "left"], under_way)
         print_table(f"runs in {self.runs}", ["method", "reaches", "seed", "splits"], done)

@@ -47,7 +47,7 @@ class MonteCarlo:
         source = open_source(self.reaches)
         engine = Engine(montecarlo.SLOTS, self.threads)
         if self.extend:
-            known, about = database.shipped(self.reaches)
+            known, about = database.load_shipped(self.reaches)
             montecarlo.restore(source, search, folder, known, about["settings"] // search.block)
         with progress_bar("rows of return 20", self.quiet) as progress:
             draws = montecarlo.run(

@@ -36,7 +36,7 @@ def widen(words: Sequence[str], verb: Any) -> Any:
         return verb
     from dextron_bench.methods import registry
 
-    found = registry.find(spec)
+    found = registry.find_method(spec)
     if not dataclasses.is_dataclass(found) or not dataclasses.fields(found):
         return verb
     own = {field.name for field in dataclasses.fields(verb)}

@@ -44,7 +44,7 @@ class Data:
         from dextron_bench.storage import hashing
         from dextron_bench.success import generation
 
-        agents = {hashing.sha256(file): weights.own(file) for file in self.policies}
+        agents = {hashing.sha256(file): weights.load_agent_from_file(file) for file in self.policies}
         wanted = generation.DatasetConfig(self.reaches, self.seed, tuple(agents))
         source, train = open_source(self.reaches), load_split(self.reaches, "train").cases
         folder = folder_of(self.runs, self.reaches, self.seed)

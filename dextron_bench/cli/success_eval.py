@@ -56,7 +56,7 @@ class Eval:
         from dextron_bench.success import evaluation
 
         model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
-        players = {"experts": None} | {str(policy): weights.own(policy) for policy in self.policies}
+        players = {"experts": None} | {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
         rows = []
         for name in self.split or ranking_splits(self.reaches):
             cases = _first(load_split(self.reaches, name).cases, self.rows)
@@ -105,7 +105,7 @@ class Explain:
 
         model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
         cases = _first(load_split(self.reaches, self.split).cases, self.rows)
-        policies = {str(policy): weights.own(policy) for policy in self.policies}
+        policies = {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
         found = exemplars.choose(exemplars.play_and_predict(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
         figures.ridges({exemplars.KINDS[kind]: seen for kind, seen in found.items()}, self.into)

@@ -31,7 +31,7 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.experts.policies import Case, closes
+from dextron_bench.experts.policies import Case, is_closing
 from dextron_bench.world import model, task
 
 CAUSES = ("solved", "too early", "too late", "knocked over", "slipped", "never reached", "agent failed")
@@ -61,14 +61,14 @@ class Diagnosis:
 def diagnose(episode: Episode, case: Case) -> Diagnosis:
     """What became of an episode of a case, which must be its own."""
     states = episode.states
-    closed = closing(task.closure(states))
-    expected = expert_closing(task.distance(states), case.expert.critical)
+    closed = closing_start(task.closure(states))
+    expected = expert_closing_start(task.distance(states), case.expert.critical)
     end = len(states) - 1
     lag = np.nan if closed is None else (closed - (end if expected is None else expected)) * model.CONTROL_STEP
     return Diagnosis(_cause(episode, lag, fell_first=episode.terminated and expected is None), lag)
 
 
-def closing(closures: np.ndarray) -> int | None:
+def closing_start(closures: np.ndarray) -> int | None:
     """The state at which the largest rise of closures (T + 1,) began, None where there was none of CLOSED."""
     lowest = np.minimum.accumulate(closures)
     top = int(np.argmax(closures - lowest))
@@ -77,20 +77,20 @@ def closing(closures: np.ndarray) -> int | None:
     return int(np.flatnonzero(closures[: top + 1] <= lowest[top] + STILL)[-1])
 
 
-def expert_closing(distances: np.ndarray, critical: float) -> int | None:
+def expert_closing_start(distances: np.ndarray, critical: float) -> int | None:
     """The state in which an expert with that d_c begins to close for distances (T + 1,) [m], None where it does not."""
-    closing = closes(distances[1:], distances[0], np.array(critical))
+    closing = is_closing(distances[1:], distances[0], np.array(critical))
     return int(np.argmax(closing)) + 1 if closing.any() else None
 
 
-def touch(states: np.ndarray) -> int | None:
+def first_touch(states: np.ndarray) -> int | None:
     """The first of states (T + 1, 48) in which the bottle has moved sideways by TOUCH, None where there is none."""
     bottle = states[:, model.BOTTLE_POSITION][:, :2]
     moved = np.linalg.norm(bottle - bottle[0], axis=1) > TOUCH
     return int(np.argmax(moved)) if moved.any() else None
 
 
-def table(episodes: pd.DataFrame) -> pd.DataFrame:
+def cause_table(episodes: pd.DataFrame) -> pd.DataFrame:
     """Episodes of each method (rows) by cause (columns, as CAUSES) from a table with columns `method`, `cause`."""
     counts = pd.crosstab(episodes["method"], episodes["cause"])
     return counts.reindex(columns=list(CAUSES), fill_value=0)
@@ -103,7 +103,7 @@ def _cause(episode: Episode, lag: float, fell_first: bool) -> str:
     if episode.success:
         return "solved"
     states = episode.states
-    heights, touched = task.bottle_height(states), touch(states)
+    heights, touched = task.bottle_height(states), first_touch(states)
     if heights.max() >= RAISED and heights.max() - heights[-1] >= DROP:
         return "slipped"
     if touched is None and task.distance(states).min() >= REACHED:

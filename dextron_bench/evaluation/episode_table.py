@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from dextron_bench.evaluation import diagnosis
-from dextron_bench.evaluation.episodes import Episode, trace
+from dextron_bench.evaluation.episodes import Episode, fingerprint
 from dextron_bench.splits.loading import Split
 
 
@@ -27,6 +27,6 @@ def row(split: Split, index: int, episode: Episode) -> dict[str, Any]:
         "cause": found.cause,
         "closing_lag": found.closing_lag,
         "actions": episode.actions[:, 0],
-        "trace": trace(episode),
+        "trace": fingerprint(episode),
         "final": episode.states[-1],
     }

@@ -43,7 +43,7 @@ class Episode:
         return self.score == task.SUCCESS
 
 
-def trace(episode: Episode) -> str:
+def fingerprint(episode: Episode) -> str:
     """SHA-256 over all states, actions and rewards, hexadecimal."""
     arrays = (episode.states, episode.actions, episode.rewards)
     return hashing.digest(*(np.ascontiguousarray(array, "<f8").tobytes() for array in arrays))

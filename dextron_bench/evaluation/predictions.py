@@ -30,7 +30,7 @@ class StepPredictions:
 def expert_actions(expert: Expert, states: np.ndarray) -> np.ndarray:
     """What an expert would have done (T,) in states (T, 48) that came one after the other."""
     distances = task.distance(states)
-    closing = policies.closes(distances, np.full(len(states), distances[0]), np.full(len(states), expert.critical))
-    actions = policies.law(task.closure(states), closing, np.full(len(states), expert.gain))[:, 0]
+    closing = policies.is_closing(distances, np.full(len(states), distances[0]), np.full(len(states), expert.critical))
+    actions = policies.closing_speeds(task.closure(states), closing, np.full(len(states), expert.gain))[:, 0]
     actions[0] = 0.0
     return actions

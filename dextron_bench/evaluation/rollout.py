@@ -57,7 +57,7 @@ class _Evaluation:
             self._note(sound, actions[sound], step)
             ended = np.flatnonzero(step.ended)
             yield from [self._episode(sound[i], bool(step.terminated[i]), bool(step.truncated[i])) for i in ended]
-            yield from [self._episode(slot, failure=fault(actions[slot, 0])) for slot in faulty]
+            yield from [self._episode(slot, failure=describe_fault(actions[slot, 0])) for slot in faulty]
             self._refill(np.union1d(sound[ended], faulty))
 
     def _ask(self) -> np.ndarray:
@@ -109,6 +109,6 @@ class _Evaluation:
         )
 
 
-def fault(action: float) -> str:
+def describe_fault(action: float) -> str:
     """What is wrong with an action that may not be played."""
     return f"action {action:g} is outside [-1, 1]" if np.isfinite(action) else f"action is {action}"

@@ -29,13 +29,13 @@ class Tally:
     solved: int
 
 
-def claim(search: dict[str, Any], folder: Path) -> None:
+def write_or_check(search: dict[str, Any], folder: Path) -> None:
     """Makes the folder this search's, or checks that it is."""
     config = {"search": search, "physics": model.mjcf_hash()}
-    folder_config.write_or_check(folder / SEARCH, config, "search", "choose another folder, or remove it")
+    folder_config.write_or_check_file(folder / SEARCH, config, "search", "choose another folder, or remove it")
 
 
-def claimed(folder: Path) -> dict[str, Any]:
+def read_config(folder: Path) -> dict[str, Any]:
     """Which search, under which physics, a folder was claimed for; empty where it was for none."""
     file = folder / SEARCH
     return atomic.read_json(file) if file.exists() else {}
@@ -43,18 +43,18 @@ def claimed(folder: Path) -> dict[str, Any]:
 
 def write(folder: Path, number: int, draws: pd.DataFrame) -> None:
     """Puts a block in store, whole."""
-    atomic.write_atomically(file_of(folder, number), lambda part: draws.to_parquet(part, compression="zstd"))
+    atomic.write_atomically(block_file(folder, number), lambda part: draws.to_parquet(part, compression="zstd"))
 
 
-def file_of(folder: Path, number: int) -> Path:
+def block_file(folder: Path, number: int) -> Path:
     """Where a block is stored."""
     return folder / "blocks" / f"{number:06d}.parquet"
 
 
-def refresh(folder: Path, done: dict[int, Tally]) -> dict[int, Tally]:
+def update_tallies(folder: Path, done: dict[int, Tally]) -> dict[int, Tally]:
     """The tallies of all blocks in store; only those not yet in `done` are read."""
     stored = sorted(int(file.stem) for file in (folder / "blocks").glob("[0-9]*.parquet"))
-    return {number: done.get(number) or _tally(read(file_of(folder, number))) for number in stored}
+    return {number: done.get(number) or _tally(read(block_file(folder, number))) for number in stored}
 
 
 def read(file: Path) -> pd.DataFrame:
@@ -71,7 +71,7 @@ def total(done: dict[int, Tally]) -> Tally:
     return Tally(len(done), sum(t.draws for t in parts), sum(t.kept for t in parts), sum(t.solved for t in parts))
 
 
-def last_needed(done: dict[int, Tally], rows: int) -> int | None:
+def last_block_needed(done: dict[int, Tally], rows: int) -> int | None:
     """The block with which blocks 0, 1, ... reach so many solved rows; None while they do not."""
     solved = number = 0
     while number in done:

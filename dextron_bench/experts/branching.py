@@ -104,7 +104,7 @@ class _BranchingRollout:
         live = self._live
         states = self._engine.states(live)
         closing = self._closing(live, task.distance(states)) & ~self._opening[live]
-        actions = policies.law(task.closure(states), closing, self._gain[live])
+        actions = policies.closing_speeds(task.closure(states), closing, self._gain[live])
         actions[self._length[live] == 0] = 0.0
         step = self._engine.step(live, actions)
         self._return[live] += step.rewards
@@ -113,7 +113,7 @@ class _BranchingRollout:
         return [done for slot in live[step.ended] for done in self._finish(slot)]
 
     def _closing(self, slots: np.ndarray, distances: np.ndarray) -> np.ndarray:
-        return policies.closes(distances, self._first[slots], self._critical[slots])
+        return policies.is_closing(distances, self._first[slots], self._critical[slots])
 
     def _fork(self, slot: int) -> None:
         """Lets every expert of an opening that closes now go its own way."""

@@ -33,7 +33,7 @@ def save(
     atomic.write_atomically(file, lambda part: kept.to_parquet(part, compression="zstd"))
     about = {
         "search": asdict(search),
-        "digest": digest(kept),
+        "digest": rows_digest(kept),
         "draws": len(draws),
         "settings": len(draws) // search.experts,
         "kept": len(kept),
@@ -50,7 +50,7 @@ def load(file: Path) -> pd.DataFrame:
     expected = summary(file)["digest"]
     try:
         rows = pd.read_parquet(file)
-        found = digest(rows)
+        found = rows_digest(rows)
     except FileNotFoundError:
         raise
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -71,7 +71,7 @@ def summary(file: Path) -> dict[str, Any]:
     return found
 
 
-def shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:
+def load_shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:
     """The database that ships for a source of reaches, and its summary; raises FileNotFoundError where none does."""
     with as_file(files("dextron_bench") / "data") as folder:
         file = folder / f"experts-{reaches}.parquet"
@@ -80,7 +80,7 @@ def shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:
         return load(file), summary(file)
 
 
-def digest(rows: pd.DataFrame) -> str:
+def rows_digest(rows: pd.DataFrame) -> str:
     """SHA-256 of a database's rows in order."""
     names = "\n".join(rows["reach"]).encode()
     numbers = rows.drop(columns="reach").sort_index(axis=1)

@@ -99,19 +99,19 @@ def run(
     different shares may work in one folder. Raises FolderMismatch where it holds another search, and
     DamagedBlock.
     """
-    blocks.claim(asdict(search), folder)
-    done = blocks.refresh(folder, {})
+    blocks.write_or_check(asdict(search), folder)
+    done = blocks.update_tallies(folder, {})
     report(blocks.total(done))
-    if blocks.last_needed(done, rows) is None:
+    if blocks.last_block_needed(done, rows) is None:
         for number, draws in _play(source, search, engine, done, share or Share()):
             blocks.write(folder, number, draws)
-            done = blocks.refresh(folder, done)
+            done = blocks.update_tallies(folder, done)
             report(blocks.total(done))
-            if blocks.last_needed(done, rows) is not None:
+            if blocks.last_block_needed(done, rows) is not None:
                 break
-    last = blocks.last_needed(done, rows)
+    last = blocks.last_block_needed(done, rows)
     assert last is not None
-    return pd.concat([blocks.read(blocks.file_of(folder, number)) for number in range(last + 1)], ignore_index=True)
+    return pd.concat([blocks.read(blocks.block_file(folder, number)) for number in range(last + 1)], ignore_index=True)
 
 
 def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataFrame, count: int) -> None:
@@ -120,7 +120,7 @@ def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataF
     Only what a database knows comes back: draws it did not keep get a score of 0 and no length. Blocks
     already in store stay. Raises FolderMismatch where rows are not of this search.
     """
-    blocks.claim(asdict(search), folder)
+    blocks.write_or_check(asdict(search), folder)
     key = ["reach", "gain", "critical"]
     found = 0
     for number in range(count):
@@ -130,7 +130,7 @@ def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataF
         place = place[np.logical_and.accumulate(place >= 0)]
         draws.loc[place, ["score", "length"]] = ahead[["score", "length"]].head(len(place)).to_numpy(float)
         found += len(place)
-        if not blocks.file_of(folder, number).exists():
+        if not blocks.block_file(folder, number).exists():
             blocks.write(folder, number, draws)
     if found < len(kept):
         raise folder_config.FolderMismatch(f"row {found} of the database is not of a search with seed {search.seed}")

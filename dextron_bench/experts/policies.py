@@ -36,12 +36,12 @@ class Case:
     window: float
 
 
-def closes(distances: np.ndarray, first: np.ndarray, critical: np.ndarray) -> np.ndarray:
+def is_closing(distances: np.ndarray, first: np.ndarray, critical: np.ndarray) -> np.ndarray:
     """True where an expert is in its closing phase: distances [m], first distances [m], d_c, each (N,)."""
     return (distances / first < critical) | (distances < ALWAYS_CLOSE)
 
 
-def law(closures: np.ndarray, closing: np.ndarray, gain: np.ndarray) -> np.ndarray:
+def closing_speeds(closures: np.ndarray, closing: np.ndarray, gain: np.ndarray) -> np.ndarray:
     """Closing speeds (N, 1) in [-1, 1] of Eq. 1 for closures, phase and gain K, each (N,)."""
     target = np.where(closing, CLOSED, OPEN)
     return np.clip(gain * (target - closures), -1.0, 1.0)[:, None]
@@ -72,8 +72,8 @@ class ExpertAgent:
         distances = task.distance(states)
         fresh = np.isnan(self._first)
         self._first = np.where(fresh, distances, self._first)
-        closing = closes(distances, self._first, self._critical)
-        actions = law(task.closure(states), closing, self._gain)
+        closing = is_closing(distances, self._first, self._critical)
+        actions = closing_speeds(task.closure(states), closing, self._gain)
         actions[fresh] = 0.0
         return actions
 

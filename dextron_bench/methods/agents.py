@@ -1,51 +1,52 @@
-"""What an agent offers, and the errors that its code leads to."""
+"""What an agent offers, and the errors that an agent's code can cause."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from dextron_bench.experts.policies import Expert
+if TYPE_CHECKING:
+    from dextron_bench.experts.policies import Expert
 
 
 class Agent(Protocol):
-    """Acts in N episodes at once; may keep memory per episode."""
+    """Acts in N episodes at once; it may keep memory for each episode."""
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Tells that rows `episodes` (n,) of the states to come begin a new episode."""
+        """Announces that rows `episodes` (n,) of the next states begin a new episode."""
         ...
 
     def act(self, states: np.ndarray) -> np.ndarray:
-        """Maps states (N, 48) to closing speeds (N, 1) in [-1, 1]. N stays the same from call to call."""
+        """Maps states (N, 48) to closing speeds (N, 1) in [-1, 1]; N is the same in every call."""
         ...
 
 
 @runtime_checkable
 class Privileged(Protocol):
-    """An agent that is told each setting's own expert: EXP, and no other on the leaderboard."""
+    """An agent that receives each setting's expert. On the leaderboard only EXP does."""
 
     def assign(self, episodes: np.ndarray, experts: Sequence[Expert]) -> None:
-        """Comes before `reset`: rows `episodes` (n,) are about to play these experts' settings."""
+        """Receives the experts of the settings that rows `episodes` (n,) play next; called before `reset`."""
         ...
 
 
 class AgentError(ValueError):
-    """An agent that raises, or whose actions are not of the agreed shape."""
+    """The agent's code raised an exception, or its actions have a wrong shape or type."""
 
 
 class AgentCrashed(RuntimeError):
-    """Raised in `act` by an agent that can start again: it fails the episodes that are being played, and no others."""
+    """Raised in `act` by an agent that can start again: the current episodes fail, and the others are still played."""
 
 
 @contextmanager
-def as_agent_error(what: str) -> Iterator[None]:
-    """Makes what an entrant's own code raises an AgentError that says where: `what`, a phrase like "act()"."""
+def as_agent_error(call: str) -> Iterator[None]:
+    """Turns any exception of an agent's code into an AgentError; `call` names the code, such as "act()"."""
     try:
         yield
     except (AgentCrashed, AgentError):
         raise
     except Exception as error:
-        raise AgentError(f"{what} raised {type(error).__name__}: {error}; --debug shows where") from error
+        raise AgentError(f"{call} raised {type(error).__name__}: {error}; --debug shows where") from error

@@ -1,7 +1,11 @@
-"""What a method that trains offers, and what it is given: the contract between the harness and a learner.
+"""The contract between the harness and a method that trains: what a learner offers, and what it receives.
 
-The harness (`training.py`) owns epochs, files, resuming, the learning curve and the choice of a checkpoint;
-a learner owns its networks and its experience.
+The harness (`dextron_bench/training`) runs the epochs, writes files, resumes a killed training, makes the learning
+curve and picks the best checkpoint. A learner owns its networks and its experience. To write a learner:
+
+1. Write a frozen dataclass with the members of `Learner`; its fields are the settings and the flags of `run`.
+2. Return from `trainer` an object with the members of `Trainer`. It trains all given seeds together.
+3. Return from `policy` an agent that acts by the weights of one seed (`dextron_bench.methods.agents.Agent`).
 """
 
 from __future__ import annotations
@@ -13,19 +17,22 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
-if TYPE_CHECKING:  # A learner's file is read by the isolated process of its agent, which may not import the world.
+if TYPE_CHECKING:  # The process of an isolated agent imports this module, and may not import the world.
     from dextron_bench.experts.policies import Case
     from dextron_bench.methods.agents import Agent
     from dextron_bench.reaches.setting import Source
 
-Arrays = dict[str, np.ndarray]  # Named arrays, as a safetensors file holds them.
+Arrays = dict[str, np.ndarray]  # Arrays by name, the content of a safetensors file.
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """What there is to train with: reaches, the cases of `train`, threads and device to compute on.
+    """What a learner trains with.
 
-    `cache` is a folder for what can be made again, such as demonstrations; others may use it too.
+    `source` gives the reaches, and `cases` are the rows of `train`: settings with their experts. `cache` is a folder
+    for files that can be made again, such as demonstrations; several learners may share it. `threads` is the number of
+    threads of the simulation (0: one per processor), `device` the PyTorch device of the networks. Neither may change a
+    result.
     """
 
     source: Source
@@ -36,35 +43,36 @@ class Track:
 
 
 class Trainer(Protocol):
-    """The training of one agent for each of S seeds, together.
+    """Trains one agent for each of S seeds, all S together.
 
-    A trainer made anew, `restore`d from another's `state` and all its `journal`s, goes on bit for bit as
-    the other would have. Both are asked for between epochs only.
+    Resuming must be exact to the bit: a new trainer that receives another trainer's `state` and all its `journal`s in
+    `restore` must continue as the other would have. The harness calls every method below `advance` between epochs only.
     """
 
-    epoch: int  # Epochs done.
+    epoch: int  # Number of finished epochs.
 
     def advance(self) -> list[dict[str, float]]:
-        """Trains for one epoch; returns what to note of it, for each seed: finite numbers, what is unknown left out.
+        """Trains for one epoch; returns the epoch's metrics, one dict per seed.
 
-        `frames` is the number of control steps that the agent has lived through so far.
+        Values are finite; leave out a metric that is not known. `frames` is the total number of control steps that
+        the agent has acted in so far.
         """
         ...
 
     def weights(self) -> list[Arrays]:
-        """What `Learner.policy` needs to act as the agents do now, for each seed; copies."""
+        """Copies of the arrays that `Learner.policy` needs to act as the agents act now, one dict per seed."""
         ...
 
     def state(self) -> Arrays:
-        """All that training goes on from, but what journals hold."""
+        """Everything that training continues from, except what the journals hold."""
         ...
 
     def journal(self) -> Arrays:
-        """The experience gathered since the last journal was asked for; may be empty."""
+        """The experience gathered since the last call of `journal`; may be empty."""
         ...
 
     def restore(self, state: Arrays, journals: Iterable[Arrays]) -> None:
-        """Puts the trainer where the one was that gave this state and, before it, these journals in order."""
+        """Continues from another trainer's `state`; `journals` are all its journals up to that state, oldest first."""
         ...
 
 
@@ -72,45 +80,57 @@ class Trainer(Protocol):
 class Learner(Protocol):
     """A method that trains: a frozen dataclass whose fields are its settings, each with a default.
 
-    `label` names its runs and its row, and distinguishes settings, as "rlil-0.1" does. It trains for `epochs`; every
-    `period` epochs there is a checkpoint and a point of the learning curve. `train_source` names the source of reaches
-    on which it is trained and evaluated, whatever source a run asks for: "minjerk" for SIM; if it is empty, the run
-    decides. `timing_run` is a learner, perhaps itself, whose last epoch takes as long as most epochs of this one: it
-    serves to estimate the time of a training.
+    `name` names the method, such as "rlil". `train_source` names the source of reaches on which the method is always
+    trained and evaluated, such as "minjerk" for SIM; if it is empty, the run chooses the source.
     """
 
     name: ClassVar[str]
     train_source: ClassVar[str]
 
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """The name of the runs and of the leaderboard row; settings that differ give labels that differ: "rlil-0.1"."""
+        ...
 
     @property
-    def epochs(self) -> int: ...
+    def epochs(self) -> int:
+        """How many epochs the training lasts."""
+        ...
 
     @property
-    def period(self) -> int: ...
+    def period(self) -> int:
+        """Every so many epochs, the harness saves a checkpoint and adds a point to the learning curve."""
+        ...
 
     @property
-    def timing_run(self) -> Learner: ...
+    def timing_run(self) -> Learner:
+        """A learner, or this one, whose last epoch takes as long as most epochs of this one.
+
+        The harness trains it to estimate the time of a whole training.
+        """
+        ...
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
-        """A trainer at its start, 0 epochs done."""
+        """A new trainer for these seeds, with `epoch` 0; equal seeds give equal trainings."""
         ...
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> Agent:
-        """The deterministic agent of a seed's weights."""
+        """The deterministic agent that acts by one seed's weights, an element of `Trainer.weights`."""
         ...
 
 
 @runtime_checkable
 class PolicyTransfer(Protocol):
-    """A method that trains nothing: it takes the policy of the learner `source_policy` to other reaches, like SOR."""
+    """A method that trains nothing and plays the trained policy of a learner on other reaches, as SOR does."""
 
     name: ClassVar[str]
 
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """The name of the runs and of the leaderboard row."""
+        ...
 
     @property
-    def source_policy(self) -> Learner: ...
+    def source_policy(self) -> Learner:
+        """The learner whose trained policy is played."""
+        ...

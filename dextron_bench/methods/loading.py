@@ -1,4 +1,4 @@
-"""Code of entrants: classes by the name of a module or a file, which may raise anything when they are imported."""
+"""Classes of methods, loaded from entry points, modules and files; their code may raise anything when imported."""
 
 from __future__ import annotations
 
@@ -7,37 +7,66 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Callable
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-PREFIX = "dextron_entrant_"  # What the names of modules made of files begin with.
+from dextron_bench.methods.specs import AgentSpec
+
+GROUP = "dextron_bench.methods"  # Entry points of installed methods.
+PREFIX = "dextron_entrant_"  # Begins the names of modules that are loaded from files.
 
 
 class UnknownMethod(KeyError):
-    """A method that is not there, or is none."""
+    """A method that does not exist, or a class that is not a method."""
 
     def __str__(self) -> str:
         return str(self.args[0])
 
 
-def find(spec: str) -> Any:
-    """What `module:Class` or `file.py:Class` names, or None; raises UnknownMethod where it cannot be imported."""
-    place, _, name = spec.rpartition(":")
-    module = loaded(spec, lambda: _from_file(spec, place) if place.endswith(".py") else importlib.import_module(place))
-    return getattr(module, name, None)
+def installed_methods() -> tuple[str, ...]:
+    """Names of the installed methods, sorted."""
+    return tuple(sorted(entry_points(group=GROUP).names))
 
 
-def origin(found: type) -> dict[str, str | None]:
-    """Where a class is from: its name, and for one of a file the SHA-256 of its content."""
-    called, digest = found.__module__, None
-    if called.startswith(PREFIX) and (file := sys.modules[called].__file__):
-        called, digest = Path(file).name, hashlib.sha256(Path(file).read_bytes()).hexdigest()
-    return {"class": f"{called}:{found.__qualname__}", "sha256": digest}
+def load_class(spec: AgentSpec) -> Any:
+    """What a spec of kind method, module or file names; None if its module has no such name.
+
+    Raises UnknownMethod if no such method is installed, the import fails, or the spec is of another kind.
+    """
+    if spec.kind == "method":
+        return _load_installed(spec.name)
+    if spec.kind == "module":
+        module = _import(str(spec), lambda: importlib.import_module(spec.location))
+    elif spec.kind == "file":
+        module = _import(str(spec), lambda: _module_of_file(spec))
+    else:
+        raise UnknownMethod(f"{str(spec)!r} is a {spec.kind}, not a method; {_choices()}")
+    return getattr(module, spec.name, None)
 
 
-def loaded(spec: str, load: Callable[[], Any]) -> Any:
-    """What `load` gives; an entrant's code may raise anything, or end the process."""
+def class_origin(cls: type) -> dict[str, str | None]:
+    """Where a class comes from: `class` is its name, `sha256` the hash of its file, None if it is in a module."""
+    module, digest = cls.__module__, None
+    if module.startswith(PREFIX) and (file := sys.modules[module].__file__):
+        module, digest = Path(file).name, hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    return {"class": f"{module}:{cls.__qualname__}", "sha256": digest}
+
+
+def _load_installed(name: str) -> Any:
+    entries = list(entry_points(group=GROUP, name=name))
+    if not entries:
+        raise UnknownMethod(f"no method {name!r}; {_choices()}")
+    return _import(name, entries[0].load)
+
+
+def _choices() -> str:
+    return f"choose from {', '.join(installed_methods())}, or give module:Class or file.py:Class"
+
+
+def _import(spec: str, load: Callable[[], Any]) -> Any:
+    """The result of `load`, which runs an entrant's code: the code may raise anything, or end the process."""
     try:
         return load()
     except UnknownMethod:
@@ -46,21 +75,21 @@ def loaded(spec: str, load: Callable[[], Any]) -> Any:
         raise UnknownMethod(f"method {spec!r} cannot be imported: {type(error).__name__}: {error}") from error
 
 
-def _from_file(spec: str, place: str) -> ModuleType:
-    """The module of a file, executed once in a process."""
-    file = Path(place).resolve()
+def _module_of_file(spec: AgentSpec) -> ModuleType:
+    """The module of a file; a process executes each file once."""
+    file = Path(spec.location).resolve()
     if not file.is_file():
-        raise UnknownMethod(f"method {spec!r}: there is no file {place}")
+        raise UnknownMethod(f"method {str(spec)!r}: there is no file {spec.location}")
     name = f"{PREFIX}{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]
-    loaded = importlib.util.spec_from_file_location(name, file)
-    assert loaded is not None
-    assert loaded.loader is not None
-    module = importlib.util.module_from_spec(loaded)
+    module_spec = importlib.util.spec_from_file_location(name, file)
+    assert module_spec is not None
+    assert module_spec.loader is not None
+    module = importlib.util.module_from_spec(module_spec)
     sys.modules[name] = module
     try:
-        loaded.loader.exec_module(module)
+        module_spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[name]
         raise

@@ -1,4 +1,4 @@
-"""Weights of trained methods: the file of a run, those that ship beside a method's code, and a user's own."""
+"""Weights of trained methods: the file of a run, files shipped beside a method's code, and files of users."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.methods import registry, weights
+from dextron_bench.methods import registry
 from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 
 FILE = "weights.safetensors"  # In a run's folder.
-TOLD = ("label", "reaches", "seeds", "epochs", "best_epoch", "frames")  # What a result says of its weights.
+METADATA = ("label", "reaches", "seeds", "epochs", "best_epoch", "frames")  # What a result copies from its weights.
 
 
 class MissingWeights(LookupError):
@@ -26,55 +26,55 @@ class BadWeights(ValueError):
     """A file of weights that does not fit its method."""
 
 
-def place(learner: Learner, reaches: str) -> Path:
-    """The folder of the weights that ship for a method on a source of reaches: beside its code."""
+def shipped_folder(learner: Learner, reaches: str) -> Path:
+    """The folder of a method's shipped weights for a source of reaches; it lies beside the method's code."""
     return Path(inspect.getfile(type(learner))).parent / "weights" / learner.label / reaches
 
 
 def shipped(learner: Learner, reaches: str) -> dict[int, Path]:
-    """The weights that ship for a method on a source of reaches, by seed, in order."""
-    files = place(learner, reaches).glob("seed*.safetensors")
-    found = {file.stem.removeprefix("seed"): file for file in files}
-    return {int(seed): found[seed] for seed in sorted(found, key=lambda s: (len(s), s)) if seed.isdigit()}
+    """The files of a method's shipped weights for a source of reaches, by seed, sorted."""
+    paths = shipped_folder(learner, reaches).glob("seed*.safetensors")
+    files = {file.stem.removeprefix("seed"): file for file in paths}
+    return {int(seed): files[seed] for seed in sorted(files, key=lambda s: (len(s), s)) if seed.isdigit()}
 
 
-def labels(learner: Learner, reaches: str) -> list[str]:
-    """What weights for a source of reaches ship beside a method's code, its own or its neighbours'."""
-    return sorted(found.parent.name for found in place(learner, reaches).parents[1].glob(f"*/{reaches}"))
+def shipped_labels(learner: Learner, reaches: str) -> list[str]:
+    """Labels of all weights for a source of reaches that ship in the same package as a method, sorted."""
+    return sorted(folder.parent.name for folder in shipped_folder(learner, reaches).parents[1].glob(f"*/{reaches}"))
 
 
-def everything(reaches: str) -> list[Path]:
-    """All weights that ship for a source of reaches, those of the methods' own and their neighbours', in order."""
-    learners = [made for made in map(registry.create, registry.known()) if isinstance(made, Learner)]
-    beside = {place(learner, reaches).parents[1] for learner in learners}
-    return sorted(file for folder in beside for file in folder.glob(f"*/{reaches}/seed*.safetensors"))
+def all_shipped(reaches: str) -> list[Path]:
+    """The files of all weights for a source of reaches that ship in the packages of installed methods, sorted."""
+    methods = [registry.create(name) for name in registry.installed_methods()]
+    folders = {shipped_folder(method, reaches).parents[1] for method in methods if isinstance(method, Learner)}
+    return sorted(file for folder in folders for file in folder.glob(f"*/{reaches}/seed*.safetensors"))
 
 
-def about(file: Path) -> dict[str, Any]:
-    """What a file's weights come from, and the SHA-256 of the file; raises BadTensors, OSError."""
-    found = tensors.read_about(file)
-    return {**{name: found[name] for name in TOLD if name in found}, "sha256": hashing.sha256(file)}
+def metadata(file: Path) -> dict[str, Any]:
+    """The training that made a file's weights, and the SHA-256 of the file; raises BadTensors, OSError."""
+    header = tensors.read_about(file)
+    return {**{name: header[name] for name in METADATA if name in header}, "sha256": hashing.sha256(file)}
 
 
-def seed(file: Path) -> int:
-    """The seed of a file's weights, 0 where it does not say; raises BadTensors, OSError."""
-    found = tensors.read_about(file).get("seed")
-    return found if type(found) is int and found >= 0 else 0
+def seed_of(file: Path) -> int:
+    """The seed of a file's weights, 0 if the file does not say it; raises BadTensors, OSError."""
+    seed = tensors.read_about(file).get("seed")
+    return seed if type(seed) is int and seed >= 0 else 0
 
 
-def agent(learner: Learner, file: Path) -> Agent:
-    """The agent of a file's weights; raises BadWeights, BadTensors, OSError."""
+def load_agent(learner: Learner, file: Path) -> Agent:
+    """The agent of a file's weights, tried on one state; raises BadWeights, BadTensors, OSError."""
     arrays = tensors.read(file)
-    found = tensors.read_about(file).get("label", learner.label)
-    if found != learner.label:
-        raise BadWeights(f"{file} holds weights of {found!r}, not of {learner.label!r}")
+    label = tensors.read_about(file).get("label", learner.label)
+    if label != learner.label:
+        raise BadWeights(f"{file} holds weights of {label!r}, not of {learner.label!r}")
     if bad := [name for name, array in arrays.items() if not np.isfinite(array).all()]:
         raise BadWeights(f"{file} holds numbers in {bad[0]!r} that are not finite")
     try:
         with as_agent_error("policy()"):
-            made = learner.policy(arrays)
-            made.reset(np.arange(1))
-            shape = np.shape(made.act(np.tile(_still(), (1, 1))))
+            agent = learner.policy(arrays)
+            agent.reset(np.arange(1))
+            shape = np.shape(agent.act(np.tile(_state_at_rest(), (1, 1))))
     except AgentError as error:
         cause = error.__cause__
         raise BadWeights(
@@ -85,34 +85,34 @@ def agent(learner: Learner, file: Path) -> Agent:
     return learner.policy(arrays)
 
 
-def own(file: Path) -> Agent:
-    """The agent of a file that says whose weights it holds; raises BadWeights, UnknownMethod, BadTensors, OSError."""
-    found = tensors.read_about(file)
-    if not {"method", "settings"} <= found.keys():
+def load_agent_from_file(file: Path) -> Agent:
+    """The agent of a file that names its own method; raises BadWeights, UnknownMethod, BadTensors, OSError."""
+    header = tensors.read_about(file)
+    if not {"method", "settings"} <= header.keys():
         raise BadWeights(f"{file} does not say which method's weights it holds")
-    learner = registry.create(found["method"], found["settings"])
+    learner = registry.create(header["method"], header["settings"])
     if not isinstance(learner, Learner):
-        raise BadWeights(f"{file} says it holds weights of {found['method']!r}, which has none")
-    return agent(learner, file)
-
-
-def _still() -> np.ndarray:
-    """A state (48,) at rest."""
-    return np.concatenate([model.half_closed(), np.zeros(model.STATE - len(model.half_closed()))])
+        raise BadWeights(f"{file} says it holds weights of {header['method']!r}, which has none")
+    return load_agent(learner, file)
 
 
 def agent_by_name(name: str, reaches: str, seed: int = 0) -> tuple[str, Agent]:
-    """The agent that a name stands for: a row of the leaderboard whose weights ship, or its beginning; or a method.
+    """The label and the agent for a name: a label with shipped weights or its beginning, else a method.
 
     Raises MissingWeights, UnknownMethod, BadSettings, AgentError.
     """
-    ships = {file.parts[-3]: file for file in weights.everything(reaches) if file.stem == f"seed{seed}"}
-    if label := next((label for label in ships if label == name or label.startswith(f"{name}-")), None):
-        return label, weights.own(ships[label])
+    files = {file.parts[-3]: file for file in all_shipped(reaches) if file.stem == f"seed{seed}"}
+    if label := next((label for label in files if label == name or label.startswith(f"{name}-")), None):
+        return label, load_agent_from_file(files[label])
     method = registry.create(name, reaches=reaches)
     if isinstance(method, Learner | PolicyTransfer):
-        raise weights.MissingWeights(
-            f"no weights of {name!r} ship for {reaches} reaches and seed {seed}; there are {', '.join(ships) or 'none'}"
+        raise MissingWeights(
+            f"no weights of {name!r} ship for {reaches} reaches and seed {seed}; there are {', '.join(files) or 'none'}"
         )
     with as_agent_error(f"agent({seed}) of method {name!r}"):
         return registry.label(method), method.agent(seed)
+
+
+def _state_at_rest() -> np.ndarray:
+    """A state (48,) without motion."""
+    return np.concatenate([model.half_closed(), np.zeros(model.STATE - len(model.half_closed()))])

@@ -67,11 +67,11 @@ def partition(
     if by_subject:
         parts["unseen-subject"] = _take(once[is_away[once.index]], 0, sizes.evaluated, "unseen-subject")
     held = pd.concat([parts["val"], parts["test"]])
-    parts["train"] = without_near(solved[~is_away & ~is_unseen], held).sort_index()
+    parts["train"] = without_near_equal(solved[~is_away & ~is_unseen], held).sort_index()
     return parts
 
 
-def without_near(rows: pd.DataFrame, held: pd.DataFrame) -> pd.DataFrame:
+def without_near_equal(rows: pd.DataFrame, held: pd.DataFrame) -> pd.DataFrame:
     """The rows whose setting is not near-equal to one of the held-out rows."""
     by_reach = {name: group[SETTING[1:]].to_numpy() for name, group in held.groupby("reach")}
     limits = np.array([NEAR_OFFSET, NEAR_OFFSET, NEAR_NOISE])
@@ -89,7 +89,7 @@ def draw_open(source: setting.Source, parts: Iterable[pd.DataFrame], seed: int, 
     rng = np.random.default_rng([seed, 0, 2])
     count = 2 * sizes.open
     rows = setting.to_frame([source.sample(rng) for _ in range(count)]).assign(gain=rng.uniform(*policies.GAIN, count))
-    return without_near(rows, pd.concat(parts)).head(sizes.open)
+    return without_near_equal(rows, pd.concat(parts)).head(sizes.open)
 
 
 def scan(source: setting.Source, rows: pd.DataFrame, engine: Engine, points: int) -> np.ndarray:
@@ -108,12 +108,12 @@ def grid(points: int) -> np.ndarray:
     return policies.CRITICAL_DISTANCE[0] + RANGE * (np.arange(points) + 0.5) / points
 
 
-def window(scores: np.ndarray) -> np.ndarray:
+def success_window(scores: np.ndarray) -> np.ndarray:
     """Width of the range of d_c that succeeds, from a scan (rows, points); shape (rows,)."""
     return RANGE * (scores == task.SUCCESS).mean(axis=1)
 
 
-def best(scores: np.ndarray) -> np.ndarray:
+def best_critical(scores: np.ndarray) -> np.ndarray:
     """The d_c of highest sum of rewards in a scan (rows, points), in the middle of its longest run; shape (rows,)."""
     return grid(scores.shape[1])[[_middle(row == row.max()) for row in scores]]
 
@@ -135,7 +135,7 @@ def build(
     sizes = sizes or Sizes()
     parts = partition(source, database, seed, sizes, by_subject=source.name == "real")
     parts["open"] = draw_open(source, parts.values(), seed, sizes)
-    tables = [scanned(source, name, parts[name], engine, sizes.scan) for name in SPLIT_NAMES[1:] if name in parts]
+    tables = [scan_split(source, name, parts[name], engine, sizes.scan) for name in SPLIT_NAMES[1:] if name in parts]
     solved = parts["train"].groupby(SETTING)["score"].transform("size").to_numpy()
     tables.insert(0, parts["train"].assign(window=RANGE * solved / tried, split="train")[COLUMNS])
     return write(source.name, pd.concat(tables, ignore_index=True), folder)
@@ -154,13 +154,13 @@ def write(reaches: str, table: pd.DataFrame, folder: Path) -> dict[str, dict[str
     return entry
 
 
-def scanned(source: setting.Source, name: str, rows: pd.DataFrame, engine: Engine, points: int) -> pd.DataFrame:
+def scan_split(source: setting.Source, name: str, rows: pd.DataFrame, engine: Engine, points: int) -> pd.DataFrame:
     """A split's rows with their windows, and for `open` with the best d_c of the scan."""
     once = rows.drop_duplicates(SETTING)
     scores = scan(source, once, engine, points)
     if name == "open":
-        rows = rows.assign(critical=best(scores))
-    widths = once[SETTING].assign(window=window(scores))
+        rows = rows.assign(critical=best_critical(scores))
+    widths = once[SETTING].assign(window=success_window(scores))
     table = rows.merge(widths, on=SETTING, how="left").assign(split=name)
     return table[COLUMNS]
 

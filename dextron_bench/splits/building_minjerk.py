@@ -44,7 +44,7 @@ def build(folder: Path, engine: Engine, seed: int = 0, sizes: Sizes | None = Non
     sizes = sizes or Sizes()
     source = MinjerkSource()
     parts = draw(source, engine, seed, sizes)
-    tables = [building.scanned(source, name, rows, engine, sizes.scan) for name, rows in parts.items()]
+    tables = [building.scan_split(source, name, rows, engine, sizes.scan) for name, rows in parts.items()]
     return building.write(source.name, pd.concat(tables, ignore_index=True), folder)
 
 
@@ -52,12 +52,12 @@ def draw(source: MinjerkSource, engine: Engine, seed: int, sizes: Sizes) -> dict
     """Rows of every split, in an order drawn from the seed, with no windows yet."""
     rng = np.random.default_rng([seed, 0, 3])
     listed, further = rng.permutation(REACHES), REACHES + rng.permutation(REACHES)
-    train = solved(source, listed, sizes.train, engine, sizes.batch)
-    held = solved(source, further, sizes.val + sizes.test, engine, sizes.batch)
+    train = first_solved(source, listed, sizes.train, engine, sizes.batch)
+    held = first_solved(source, further, sizes.val + sizes.test, engine, sizes.batch)
     return {"train": train, "val": held.iloc[: sizes.val], "test": held.iloc[sizes.val :]}
 
 
-def solved(source: MinjerkSource, numbers: np.ndarray, count: int, engine: Engine, batch: int) -> pd.DataFrame:
+def first_solved(source: MinjerkSource, numbers: np.ndarray, count: int, engine: Engine, batch: int) -> pd.DataFrame:
     """The first `count` rows, in the order of `numbers`, in which EXPERT scores 20; raises TooFewRows."""
     found: list[setting.Setting] = []
     for tried in np.split(numbers, range(batch, len(numbers), batch)):

@@ -22,7 +22,7 @@ def strata(split: Split) -> pd.DataFrame:
     """
     names = [case.setting.reach for case in split.cases]
     if split.reaches == "real":
-        rows = [parsing.origin(name) for name in names]
+        rows = [parsing.subject_and_region(name) for name in names]
     else:
         source = sources.open_source(split.reaches)
         found = [source.stratum(name) for name in names]
@@ -30,16 +30,16 @@ def strata(split: Split) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["subject", "ring", "angle"])
 
 
-def shipped(reaches: str, name: str, digest: str) -> pd.DataFrame | None:
+def shipped_strata(reaches: str, name: str, digest: str) -> pd.DataFrame | None:
     """The strata of a shipped split's rows; None where no split of that name and digest ships. Raises DamagedSplit."""
     if name not in known_splits(reaches) or (split := load_split(reaches, name)).digest != digest:
         return None
     return strata(split)
 
 
-def regions(reaches: str, name: str, digest: str) -> np.ndarray | None:
+def start_regions(reaches: str, name: str, digest: str) -> np.ndarray | None:
     """The start regions (rows,) of a shipped split's rows as numbers 0 to 15, 4 ring + angle; None as `shipped`."""
-    found = shipped(reaches, name, digest)
+    found = shipped_strata(reaches, name, digest)
     return None if found is None else (4 * found["ring"] + found["angle"]).to_numpy()
 
 

@@ -32,7 +32,7 @@ def test_a_stream_brings_whole_episodes_as_long_as_asked():
 
 def test_episodes_are_those_that_the_experts_play_and_come_back_from_the_cache(tmp_path: Path):
     track = Track(SOURCE, CASES, tmp_path, threads=1)
-    found = demonstrations.of(track)
+    found = demonstrations.load(track)
     played = dict(rollout(ExpertAgent(), SOURCE, CASES, threads=1))
     for k in range(3):
         rows = slice(found.starts[k], found.starts[k + 1])
@@ -41,8 +41,8 @@ def test_episodes_are_those_that_the_experts_play_and_come_back_from_the_cache(t
         np.testing.assert_array_equal(found.rewards[rows][:-1], played[k].rewards.astype(np.float32))
     (file,) = tmp_path.iterdir()
     written = file.stat().st_mtime_ns
-    again = demonstrations.of(track)
+    again = demonstrations.load(track)
     assert file.stat().st_mtime_ns == written
     np.testing.assert_array_equal(again.states, found.states)
-    assert len(demonstrations.of(track, episodes=2)) == 2
+    assert len(demonstrations.load(track, episodes=2)) == 2
     assert len(list(tmp_path.iterdir())) == 2

@@ -116,7 +116,7 @@ def test_it_says_which_model_it_acts_with_and_refuses_another(tmp_path: Path):
     file = fixed_success_model.write(tmp_path / "model.safetensors", 0.4)
     made = Omega(model=str(file)).for_source("real")
     assert made == Omega(model=str(file), sha256=hashing.sha256(file))
-    again = registry.create("omega", registry.settings(made))
+    again = registry.create("omega", registry.settings_of(made))
     assert again == made
     np.testing.assert_allclose(made.agent(0).act(states(0.05)), 0.4)
     fixed_success_model.write(file, -0.4)
@@ -140,7 +140,7 @@ def test_what_it_cannot_act_with_is_told(tmp_path: Path):
 def test_a_method_is_made_for_the_reaches_of_its_run(tmp_path: Path):
     file = fixed_success_model.write(tmp_path / "model.safetensors", 0.4)
     made = registry.create("omega", {"model": str(file)}, "real")
-    assert registry.settings(made)["sha256"] == hashing.sha256(file)
+    assert registry.settings_of(made)["sha256"] == hashing.sha256(file)
     assert registry.create("exp", {}, "real") == registry.create("exp")
     with pytest.raises(registry.BadSettings, match="'omega': no success model at hand"):
         registry.create("omega", {}, "minjerk")
@@ -164,7 +164,7 @@ def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], c
     assert main.main([*words, "--model", "model.safetensors", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)[0]["method"] == "omega"
     config = json.loads((here / "runs/omega/synthetic/seed0/config.json").read_text())
-    assert config["settings"] == registry.settings(Omega(model="model.safetensors", sha256=hashing.sha256(file)))
+    assert config["settings"] == registry.settings_of(Omega(model="model.safetensors", sha256=hashing.sha256(file)))
     fixed_success_model.write(file, -0.4)
     assert "holds another run: it differs in settings" in complaint(*words, "--model", "model.safetensors")
     assert "has no weights" in complaint("eval", "--method", "omega", "--model", "model.safetensors")

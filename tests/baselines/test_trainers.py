@@ -11,7 +11,7 @@ import torch
 from baselines import cycle
 from baselines.bc import Cloning, imitation_loss
 from baselines.cycle import Cycle
-from baselines.demonstrations import of
+from baselines.demonstrations import load
 from baselines.policy import MeanAgent
 from baselines.schedule import Schedule
 from dextron_bench.experts.policies import Case, Expert
@@ -33,7 +33,7 @@ def brief_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
 def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: Schedule = SCHEDULE) -> Trainer:
     track = Track(SOURCE, CASES, folder, threads=1)
     if kind == "bc":
-        return Cloning(of(track), seeds)
+        return Cloning(load(track), seeds)
     return Cycle(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
 
 
@@ -129,7 +129,7 @@ def test_the_imitation_loss_by_hand():
 def test_behaviour_cloning_recovers_an_expert(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Demonstrations of one expert on five settings: a thousand updates bring actions within 0.1 of its own."""
     monkeypatch.setattr("baselines.bc.STEPS", 250)
-    demos = of(Track(SOURCE, CASES, tmp_path, threads=1))
+    demos = load(Track(SOURCE, CASES, tmp_path, threads=1))
     cloning = Cloning(demos, [0])
     for _ in range(4):
         cloning.advance()

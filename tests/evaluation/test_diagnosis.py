@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from dextron_bench.evaluation import diagnosis
-from dextron_bench.evaluation.diagnosis import closing, diagnose, expert_closing, touch
+from dextron_bench.evaluation.diagnosis import closing_start, diagnose, expert_closing_start, first_touch
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
@@ -67,10 +67,10 @@ def test_the_states_made_here_are_what_they_say():
 
 
 def test_a_hand_closes_where_its_largest_rise_begins():
-    assert closing(closing_from(28)) == 28
-    assert closing(OPEN_FIRST) is None
-    assert closing(np.array([0.5, 0.57, 0.5, 0.5])) is None  # Rises by 0.07.
-    assert closing(np.array([0.5, 0.3, 0.31, 0.33, 0.5, 0.2, 0.3])) == 2  # The rise of 0.2, once past 0.32.
+    assert closing_start(closing_from(28)) == 28
+    assert closing_start(OPEN_FIRST) is None
+    assert closing_start(np.array([0.5, 0.57, 0.5, 0.5])) is None  # Rises by 0.07.
+    assert closing_start(np.array([0.5, 0.3, 0.31, 0.33, 0.5, 0.2, 0.3])) == 2  # The rise of 0.2, once past 0.32.
 
 
 def lag(closures: np.ndarray, critical: float = 0.251, distances: np.ndarray = APPROACH) -> float:
@@ -89,17 +89,17 @@ def test_every_expert_closes_within_3_cm():
 
 
 def test_the_end_stands_in_for_an_expert_that_never_closed():
-    assert expert_closing(np.maximum(APPROACH, 0.2), 0.251) is None
+    assert expert_closing_start(np.maximum(APPROACH, 0.2), 0.251) is None
     assert lag(closing_from(25), distances=np.maximum(APPROACH, 0.2)) == pytest.approx(-15 * 0.02)
 
 
 def test_the_first_state_is_only_measured_by():
-    assert expert_closing(APPROACH, 1.1) == 1
+    assert expert_closing_start(APPROACH, 1.1) == 1
 
 
 def test_touch():
-    assert touch(states(touched=35)) == 35
-    assert touch(states(touched=None)) is None
+    assert first_touch(states(touched=35)) == 35
+    assert first_touch(states(touched=None)) is None
 
 
 def test_solved_and_failed():
@@ -163,7 +163,7 @@ def test_a_table_counts_each_method_by_cause():
     rows = pd.DataFrame(
         [("exp", "solved"), ("exp", "solved"), ("bc", "slipped"), ("bc", "solved")], columns=["method", "cause"]
     )
-    found = diagnosis.table(rows)
+    found = diagnosis.cause_table(rows)
     assert found.columns.tolist() == list(diagnosis.CAUSES)
     assert found.index.tolist() == ["bc", "exp"]
     assert found.to_numpy().tolist() == [[1, 0, 0, 0, 1, 0, 0], [2, 0, 0, 0, 0, 0, 0]]

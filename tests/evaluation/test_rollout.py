@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.rollout import fault, rollout
+from dextron_bench.evaluation.rollout import describe_fault, rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.reaches.minjerk import MinjerkSource
@@ -113,5 +113,5 @@ def test_no_cases_give_no_episodes():
 
 
 def test_what_a_fault_is_called():
-    assert fault(-1.01) == "action -1.01 is outside [-1, 1]"
-    assert fault(-np.inf) == "action is -inf"
+    assert describe_fault(-1.01) == "action -1.01 is outside [-1, 1]"
+    assert describe_fault(-np.inf) == "action is -inf"

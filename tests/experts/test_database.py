@@ -52,7 +52,7 @@ def test_the_summary_counts_all_draws(draws: pd.DataFrame, tmp_path: Path):
     assert counts == {"draws": 6, "settings": 2, "kept": 3, "solved": 2}
     assert found["search"] == {"reaches": "brief", "seed": 7, "experts": 3, "block": 2}
     assert json.loads(file.with_suffix(".json").read_text()) == json.loads(json.dumps(found))
-    assert database.summary(file)["digest"] == database.digest(database.load(file))
+    assert database.summary(file)["digest"] == database.rows_digest(database.load(file))
 
 
 def test_statistics_by_hand(draws: pd.DataFrame):
@@ -79,12 +79,12 @@ def test_statistics_by_hand(draws: pd.DataFrame):
 
 
 def test_a_digest_knows_rows_order_and_every_bit(draws: pd.DataFrame):
-    digest = database.digest(draws)
-    assert database.digest(draws[draws.columns[::-1]]) == digest  # Columns go by name.
-    assert database.digest(draws.iloc[::-1]) != digest
+    digest = database.rows_digest(draws)
+    assert database.rows_digest(draws[draws.columns[::-1]]) == digest  # Columns go by name.
+    assert database.rows_digest(draws.iloc[::-1]) != digest
     other = draws.copy()
     other.loc[2, "critical"] = np.nextafter(0.85, 1.0)
-    assert database.digest(other) != digest
+    assert database.rows_digest(other) != digest
 
 
 def complaint(file: Path) -> str:
@@ -126,7 +126,7 @@ def test_a_missing_file_is_not_damage(saved: Path):
 @pytest.mark.parametrize("reaches", ["real", "synthetic"])
 def test_the_shipped_databases_are_whole(reaches: str):
     try:
-        rows, _ = database.shipped(reaches)
+        rows, _ = database.load_shipped(reaches)
     except FileNotFoundError:
         pytest.skip(f"no database of {reaches} reaches ships")
     assert (rows["score"] > 1.0).all()

@@ -70,7 +70,7 @@ def test_outcomes_are_those_of_a_naive_search(tmp_path):
 
 def test_a_search_stops_with_the_first_blocks_that_reach_the_rows():
     done = {0: Tally(1, 8, 3, 2), 1: Tally(1, 8, 0, 0), 2: Tally(1, 8, 5, 4), 4: Tally(1, 8, 9, 9)}
-    assert [blocks.last_needed(done, rows) for rows in (1, 2, 3, 6, 7)] == [0, 0, 2, 2, None]
+    assert [blocks.last_block_needed(done, rows) for rows in (1, 2, 3, 6, 7)] == [0, 0, 2, 2, None]
     assert blocks.total(done) == Tally(4, 32, 17, 15)
 
 

@@ -19,7 +19,7 @@ def state(closure: float, distance: float) -> np.ndarray:
 def test_closes_within_the_critical_share_of_the_first_distance_or_within_three_centimetres():
     distances, first = np.array([0.10, 0.099, 0.0301, 0.0299]), np.array([0.2, 0.2, 0.2, 0.2])
     critical = np.array([0.5, 0.5, 0.1, 0.1])
-    assert policies.closes(distances, first, critical).tolist() == [False, True, False, True]
+    assert policies.is_closing(distances, first, critical).tolist() == [False, True, False, True]
 
 
 def test_law_is_proportional_to_what_is_left_and_clipped():
@@ -29,7 +29,7 @@ def test_law_is_proportional_to_what_is_left_and_clipped():
         np.array([1.0, 1.2, 1.5, 2.0]),
     )
     # 1 (0 - 0.5), 1.2 (0.8 - 0.5), 1.5 (0 - 0.9) clipped, 2 (0.8 - 0) clipped.
-    np.testing.assert_allclose(policies.law(closures, closing, gain).ravel(), [-0.5, 0.36, -1.0, 1.0])
+    np.testing.assert_allclose(policies.closing_speeds(closures, closing, gain).ravel(), [-0.5, 0.36, -1.0, 1.0])
 
 
 def test_the_agent_sends_0_first_and_measures_by_the_first_distance():

@@ -22,7 +22,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A working folder in the tiny world with a run of the toy learner, two seeds, and of `nothing`."""
     tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(weights, "place", lambda learner, reaches: tmp_path / "beside" / learner.label / reaches)
+    monkeypatch.setattr(
+        weights, "shipped_folder", lambda learner, reaches: tmp_path / "beside" / learner.label / reaches
+    )
     common = ["--quiet", "--no-floors", "--record", "0"]
     assert main.main(["run", "--method", "toy_learner:Toy", "--preset", "quick", "--seed", "0", "1", *common]) == 0
     assert main.main(["run", "--method", "nothing", *common]) == 0
@@ -40,7 +42,7 @@ def test_results_curves_and_weights_are_taken_over_as_they_are(here: Path):
     assert sorted(file.name for file in published.iterdir()) == ["curve.json", "result.json"]
     for name in ("curve.json", "result.json"):
         assert (published / name).read_bytes() == (run / name).read_bytes()
-    assert (here / "beside/toy-0.1/synthetic/seed1.safetensors").read_bytes() == (run / weights.FILE).read_bytes()
+    assert (here / "beside/toy-0.1/synthetic/seed1.safetensors").read_bytes() == (run / "weights.safetensors").read_bytes()
     assert [file.name for file in (here / "board/results/nothing/synthetic/seed0").iterdir()] == ["result.json"]
 
 

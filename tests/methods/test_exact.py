@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dextron_bench.methods.exact import BLOCK, Perceptron, whole
+from dextron_bench.methods.exact import BLOCK, Perceptron, to_integers
 
 
 def layers(rng: np.random.Generator, *sizes: int) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -52,7 +52,7 @@ def test_it_is_as_close_to_the_plain_network_as_float32_is():
 
 @given(arrays(np.float64, (3, 5), elements=st.floats(-1e100, 1e100)), st.integers(4, 26))
 def test_whole_numbers_are_whole_of_few_bits_and_near(x: np.ndarray, bits: int):
-    numbers, units = whole(x, bits, axis=1)
+    numbers, units = to_integers(x, bits, axis=1)
     assert (numbers == np.rint(numbers)).all()
     assert np.abs(numbers).max() <= 2**bits
     assert (np.abs(numbers * units - x) <= units / 2).all()

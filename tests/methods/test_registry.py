@@ -11,7 +11,7 @@ import pytest
 
 from baselines.exp import Exp
 from baselines.floors import Nothing, Random
-from dextron_bench.methods import registry
+from dextron_bench.methods import loading, registry
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.registry import UnknownMethod
 
@@ -38,26 +38,26 @@ def file(tmp_path: Path) -> Callable[[str], Path]:
 
 
 def test_installed_methods_by_name():
-    assert {"exp", "nothing", "random"} <= set(registry.known())
-    assert registry.find("exp") is Exp
+    assert {"exp", "nothing", "random"} <= set(registry.installed_methods())
+    assert registry.find_method("exp") is Exp
     assert registry.describe("exp") == 'Replays the expert that solved each setting (paper, fig. 4a, "EXP").'
 
 
-@pytest.mark.parametrize("name", registry.known())
+@pytest.mark.parametrize("name", registry.installed_methods())
 def test_every_installed_method_can_be_made_and_has_plain_settings(name: str):
     found = registry.create(name)
     assert found.name == name
-    assert all(isinstance(value, (str, int, float, bool, tuple)) for value in registry.settings(found).values())
+    assert all(isinstance(value, (str, int, float, bool, tuple)) for value in registry.settings_of(found).values())
     assert registry.describe(name).endswith(".")
 
 
 def test_by_module():
-    assert registry.find("baselines.floors:Nothing") is Nothing
+    assert registry.find_method("baselines.floors:Nothing") is Nothing
 
 
 def test_by_file_which_is_executed_once(file: Callable[[str], Path]):
     place = file(AGENT)
-    first, second = registry.find(f"{place}:Mine"), registry.find(f"{place}:Mine")
+    first, second = registry.find_method(f"{place}:Mine"), registry.find_method(f"{place}:Mine")
     assert first is second
     assert first.name == "mine"
     assert place.with_suffix(".log").read_text() == "executed\n"
@@ -65,12 +65,14 @@ def test_by_file_which_is_executed_once(file: Callable[[str], Path]):
 
 def test_the_origin_of_a_file_changes_with_its_content(file: Callable[[str], Path]):
     spec = f"{file(AGENT)}:Mine"
-    before = registry.origin(spec)
+    before = registry.code_origin(spec)
     assert before["class"] == "mine.py:Mine"
     file(AGENT + "# Another thought.\n")
-    assert registry.origin(spec)["sha256"] != before["sha256"]
+    assert registry.code_origin(spec)["sha256"] != before["sha256"]
     assert (
-        registry.origin("exp") == registry.origin("baselines.exp:Exp") == {"class": "baselines.exp:Exp", "sha256": None}
+        registry.code_origin("exp")
+        == registry.code_origin("baselines.exp:Exp")
+        == {"class": "baselines.exp:Exp", "sha256": None}
     )
 
 
@@ -78,7 +80,7 @@ def test_an_unknown_name_lists_the_others():
     with pytest.raises(
         UnknownMethod, match=r"^no method 'xep'; choose from .*exp, .*nothing, .*random.*, or give module"
     ):
-        registry.find("xep")
+        registry.find_method("xep")
 
 
 @pytest.mark.parametrize(
@@ -89,12 +91,15 @@ def test_an_unknown_name_lists_the_others():
         ("baselines.exp:dataclass", "is not a method"),
         ("dextron_bench.experts.policies:ExpertAgent", "needs to be a class with `name` and `agent"),
         ("nosuch.py:Agent", "there is no file nosuch.py"),
-        (":Agent", "cannot be imported"),
+        (":Agent", "names no agent: write a method's name"),
+        ("mine.py", "name its class too, as in mine.py:MyAgent"),
+        ("policy.pt", "is a policy, not a method; choose from"),
+        ("exec:./agent", "is a command, not a method; choose from"),
     ],
 )
 def test_what_is_no_method_is_named(spec: str, complaint: str):
     with pytest.raises(UnknownMethod) as caught:
-        registry.find(spec)
+        registry.find_method(spec)
     assert complaint in str(caught.value)
     assert spec in str(caught.value)
 
@@ -115,7 +120,7 @@ def test_a_file_that_fails_says_how(file: Callable[[str], Path], text: str, comp
     spec = f"{file(text)}:Mine"
     for _ in range(2):  # A failed import leaves nothing that looks imported.
         with pytest.raises(UnknownMethod) as caught:
-            registry.find(spec)
+            registry.find_method(spec)
         assert complaint in str(caught.value)
 
 
@@ -126,14 +131,14 @@ def test_a_method_that_cannot_be_made_says_why(file: Callable[[str], Path]):
 
 
 def test_a_broken_installed_method_is_told_of_in_the_list(monkeypatch: pytest.MonkeyPatch):
-    broken = EntryPoints([EntryPoint("broken", "nosuch.module:Agent", registry.GROUP)])
-    monkeypatch.setattr(registry, "entry_points", lambda **params: broken.select(**params))
-    assert registry.known() == ("broken",)
+    broken = EntryPoints([EntryPoint("broken", "nosuch.module:Agent", loading.GROUP)])
+    monkeypatch.setattr(loading, "entry_points", lambda **params: broken.select(**params))
+    assert registry.installed_methods() == ("broken",)
     assert registry.describe("broken").startswith("method 'broken' cannot be imported: ModuleNotFoundError")
 
 
 def test_settings_are_the_fields():
-    assert registry.settings(Random()) == {}
+    assert registry.settings_of(Random()) == {}
 
 
 def test_equal_seeds_act_equally_and_others_do_not():

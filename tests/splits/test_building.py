@@ -101,14 +101,14 @@ def test_near_equal_settings_are_dropped():
         ],
         columns=building.SETTING,
     )
-    assert building.without_near(rows, held).index.tolist() == [1, 2, 3]
+    assert building.without_near_equal(rows, held).index.tolist() == [1, 2, 3]
 
 
 def test_window_and_best_of_a_scan():
     scores = np.array([[0, 20, 20, 20, 0, 20, 0, 0], [0, 0, 3, 0, 0, 0, 0, 0], np.zeros(8)], float)
-    np.testing.assert_allclose(building.window(scores), [0.89 * 4 / 8, 0.0, 0.0])
+    np.testing.assert_allclose(building.success_window(scores), [0.89 * 4 / 8, 0.0, 0.0])
     # The middles of bands 2 and 2; with nothing anywhere, of the whole range (band 3).
-    np.testing.assert_allclose(building.best(scores), 0.01 + 0.89 * np.array([2.5, 2.5, 3.5]) / 8)
+    np.testing.assert_allclose(building.best_critical(scores), 0.01 + 0.89 * np.array([2.5, 2.5, 3.5]) / 8)
 
 
 def test_a_scan_plays_each_row_with_its_own_gain():
@@ -154,7 +154,7 @@ def test_minjerk_rows_are_solved_by_its_one_expert_in_a_drawn_order(minjerk):
 def test_unsolved_minjerk_reaches_are_passed_over(monkeypatch):
     monkeypatch.setattr(building_minjerk, "EXPERT", policies.Expert(2.0, 0.9))  # Hits the bottle with a closed hand.
     with pytest.raises(TooFewRows, match="1 solved minjerk reaches are asked for and there are 0"):
-        building_minjerk.solved(MinjerkSource(), np.arange(4), 1, Engine(4, 1), batch=2)
+        building_minjerk.first_solved(MinjerkSource(), np.arange(4), 1, Engine(4, 1), batch=2)
 
 
 def test_minjerk_is_written_beside_the_other_sources(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import all_splits, load_split
-from dextron_bench.splits.strata import REGION, SUBJECT, by_stratum, regions, strata
+from dextron_bench.splits.strata import REGION, SUBJECT, by_stratum, start_regions, strata
 
 
 @pytest.mark.parametrize(("reaches", "split"), [(r, s) for r, s in all_splits() if s == "test"])
@@ -47,11 +47,11 @@ def test_groups_have_means_over_seeds_and_rows():
 def test_regions_are_numbered_by_ring_then_angle():
     split = load_split("real", "test")
     found = strata(split)
-    numbers = regions("real", "test", split.digest)
+    numbers = start_regions("real", "test", split.digest)
     assert numbers is not None
     assert numbers.tolist() == [4 * ring + angle for ring, angle in zip(found["ring"], found["angle"], strict=True)]
 
 
 @pytest.mark.parametrize(("name", "digest"), [("test", "0" * 64), ("nowhere", "0" * 64)])
 def test_a_split_that_does_not_ship_has_no_strata(name: str, digest: str):
-    assert regions("real", name, digest) is None
+    assert start_regions("real", name, digest) is None

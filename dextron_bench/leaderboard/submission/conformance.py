@@ -11,7 +11,7 @@ import numpy as np
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods.agents import AgentCrashed, AgentError
-from dextron_bench.methods.isolation.isolated_agent import Isolated, Limits
+from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent, Limits
 from dextron_bench.methods.isolation.launch import Launch
 from dextron_bench.reaches import sources
 from dextron_bench.splits.loading import load_split
@@ -62,7 +62,7 @@ def checks(how: Launch, reaches: str = "synthetic", limits: Limits | None = None
 
 def _play(how: Launch, reaches: str, limits: Limits, threads: int) -> list[Episode]:
     cases = load_split(reaches, "val").cases[:EPISODES]
-    with Isolated(how, 0, limits) as agent:
+    with IsolatedAgent(how, 0, limits) as agent:
         found = dict(rollout(agent, sources.open_source(reaches), cases, threads=threads))
     return [found[place] for place in range(len(cases))]
 
@@ -82,7 +82,7 @@ def _company(how: Launch, episodes: Sequence[Episode], limits: Limits) -> Check:
     states = np.stack([episode.states[:steps] for episode in episodes], axis=1)  # (T, N, 48)
     actions = np.stack([episode.actions[:steps] for episode in episodes], axis=1)
     order = np.random.default_rng(0).permutation(len(episodes))[: max(1, len(episodes) // 2)]
-    with Isolated(how, 0, limits) as agent:
+    with IsolatedAgent(how, 0, limits) as agent:
         agent.reset(np.arange(len(order)))
         try:
             found = np.stack([agent.act(now[order]) for now in states])
@@ -97,7 +97,7 @@ def _company(how: Launch, episodes: Sequence[Episode], limits: Limits) -> Check:
 
 def _cost(how: Launch, episodes: Sequence[Episode], limits: Limits) -> Iterator[Check]:
     states = np.resize(np.concatenate([episode.states for episode in episodes]), (CROWD, model.STATE))
-    with Isolated(how, 0, limits) as agent:
+    with IsolatedAgent(how, 0, limits) as agent:
         agent.reset(np.arange(CROWD))
         try:
             agent.act(states)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from dextron_bench.leaderboard.submission.declaration import Declaration
 from dextron_bench.methods import registry
-from dextron_bench.methods.isolation.launch import Launch, launch
+from dextron_bench.methods.isolation.launch import Launch, prepare_launch
 from dextron_bench.world import model
 
 FOLDER = "submissions"  # In the folder of runs.
+MANIFEST_KINDS = {"method": "method", "module": "code", "file": "code", "policy": "policy", "command": "exec"}
 
 
 class BadSubmission(ValueError):
@@ -25,7 +26,9 @@ def settle(spec: str, text: str, reaches: str) -> dict[str, Any]:
     Raises BadSubmission, BadSettings.
     """
     found = _read(text)
-    return registry.settings(registry.create(spec, found, reaches)) if spec in registry.known() else found
+    return (
+        registry.settings_of(registry.create(spec, found, reaches)) if spec in registry.installed_methods() else found
+    )
 
 
 def _read(text: str) -> dict[str, Any]:
@@ -51,7 +54,7 @@ class Entry:
     declared: Declaration = field(default_factory=Declaration)
 
     def __post_init__(self) -> None:
-        if self.name.casefold().split("-")[0] in registry.known():
+        if self.name.casefold().split("-")[0] in registry.installed_methods():
             raise BadSubmission(f"the name {self.name!r} begins like that of an installed method; choose another")
         if sorted(self.seeds) != list(range(len(self.seeds))):
             raise BadSubmission("seeds are 0, 1, 2 and so on, so that nobody chooses the best: --seed 0 1 2")
@@ -63,7 +66,7 @@ class Entry:
     @property
     def launch(self) -> Launch:
         """What starts the agent's process."""
-        return launch(self.spec, self.settings, self.weights)
+        return prepare_launch(self.spec, self.settings, self.weights)
 
     def folder(self, runs: Path) -> Path:
         """Where the runs of its seeds lie."""
@@ -71,16 +74,13 @@ class Entry:
 
     def told(self) -> dict[str, Any]:
         """What its manifest says of it."""
-        how = self.launch
-        spec = self.spec if how.kind == "method" or how.command else f"{Path(how.spec).name}"
-        agent = {"kind": how.kind or "exec", "spec": spec, "settings": self.settings}
+        spec = self.launch.spec
+        text = str(replace(spec, location=spec.file.name) if spec.file else spec)
+        agent: dict[str, Any] = {"kind": MANIFEST_KINDS[spec.kind], "spec": text, "settings": self.settings}
         agent["weights"] = self.weights.name if self.weights else ""
         told = {"name": self.name, "reaches": self.reaches, "seeds": list(self.seeds), "agent": agent}
         return {**told, "declared": asdict(self.declared), "physics": model.mjcf_hash()}
 
     def files(self) -> dict[str, Path]:
         """The agent's own files, that it can be run again from, by name."""
-        place, _, _ = self.launch.spec.rpartition(":")
-        code = [Path(place)] if self.launch.kind == "code" and place.endswith(".py") else []
-        policy = [Path(self.launch.spec)] if self.launch.kind == "policy" else []
-        return {file.name: file for file in (*code, *policy, *([self.weights] if self.weights else []))}
+        return {file.name: file for file in (self.launch.spec.file, self.weights) if file}

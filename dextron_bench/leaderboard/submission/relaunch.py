@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dextron_bench.leaderboard.submission import bundle
-from dextron_bench.methods import registry
-from dextron_bench.methods.isolation.launch import Launch, launch
+from dextron_bench.leaderboard.submission.entry import MANIFEST_KINDS
+from dextron_bench.methods import registry, specs
+from dextron_bench.methods.isolation.launch import Launch, prepare_launch
+from dextron_bench.methods.specs import AgentSpec
 
-CODE = re.compile(r"(?!exec:)[A-Za-z0-9][\w.+-]*:[A-Za-z_]\w*", re.ASCII)  # In a file that was brought, or a module.
-
-
-POLICY = re.compile(r"[A-Za-z0-9][\w.+-]*\.(?:pt|onnx)", re.ASCII)
+LOCATION = re.compile(r"[A-Za-z0-9][\w.+-]*", re.ASCII)  # A file of the bundle, without folders, or a module.
+CLASS = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
 def launch_of(told: Mapping[str, Any], files: Path) -> Launch:
@@ -22,16 +23,29 @@ def launch_of(told: Mapping[str, Any], files: Path) -> Launch:
 
     Raises BadBundle, AgentError.
     """
-    kind, spec = told["kind"], told["spec"]
-    if kind == "exec":
+    if told["kind"] == "exec":
         raise bundle.BadBundle("an agent that is a program of its own cannot be run again from its bundle")
-    if not {"method": registry.known().__contains__, "code": CODE.fullmatch, "policy": POLICY.fullmatch}[kind](spec):
-        raise bundle.BadBundle(f"{spec!r} names no agent of kind {kind!r}")
+    spec = _checked_spec(told["kind"], told["spec"])
     weights = _own(files, told["weights"]) if told["weights"] else None
-    name, _, inside = spec.partition(":")
-    if kind == "policy" or name.endswith(".py"):
-        spec = ":".join([str(_own(files, name)), *([inside] if inside else [])])
-    return launch(spec, told["settings"], weights)
+    if spec.file:
+        spec = replace(spec, location=str(_own(files, spec.location)))
+    return prepare_launch(str(spec), told["settings"], weights)
+
+
+def _checked_spec(kind: str, text: str) -> AgentSpec:
+    """The spec of a manifest if it names an installed method, a module, or a file without folders; raises BadBundle."""
+    refusal = bundle.BadBundle(f"{text!r} names no agent of kind {kind!r}")
+    try:
+        spec = specs.parse(text)
+    except specs.BadSpec as error:
+        raise refusal from error
+    if spec.kind == "method":
+        allowed = spec.name in registry.installed_methods()
+    else:
+        allowed = LOCATION.fullmatch(spec.location) and (spec.kind == "policy" or CLASS.fullmatch(spec.name))
+    if MANIFEST_KINDS[spec.kind] != kind or not allowed:
+        raise refusal
+    return spec
 
 
 def _own(files: Path, name: str) -> Path:

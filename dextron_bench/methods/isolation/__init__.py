@@ -1,1 +1,1 @@
-"""Agents in processes of their own: what they are told, what they may do, and what becomes of them when they fail."""
+"""Agents in processes of their own: how they start, what they may do, and what happens when they fail."""

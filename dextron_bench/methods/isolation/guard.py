@@ -1,7 +1,7 @@
-"""What an agent's process may not do: see the simulator or the splits, write outside its folder, reach others.
+"""What the process of an agent written in Python may not do: import the simulator, read splits, write elsewhere.
 
-A hook on Python's own audit events stops what an agent tries and says what it was. It is no boundary against code that
-means harm, which can take the hook apart: that is what `sandbox` is for (docs/leaderboard.md).
+A hook on Python's audit events stops forbidden actions and names them. The hook is no protection against malicious
+code, because such code can disable it; the sandbox is (docs/leaderboard.md).
 """
 
 from __future__ import annotations
@@ -15,21 +15,22 @@ from typing import Any
 from dextron_bench.methods.isolation import sandbox
 from dextron_bench.world import model
 
-PUBLIC = {  # Modules of the benchmark that agents may import, with what those need.
+PUBLIC = {  # Modules of the benchmark that agents may import, and the modules that these import (docs/agents.md).
     *("dextron_bench", "dextron_bench.experts", "dextron_bench.experts.policies"),
-    *("dextron_bench.methods", "dextron_bench.methods.exact", "dextron_bench.methods.learners"),
-    *("dextron_bench.reaches", "dextron_bench.reaches.reach", "dextron_bench.reaches.rotation"),
+    *("dextron_bench.methods", *(f"dextron_bench.methods.{name}" for name in ("agents", "exact", "learners"))),
+    *("dextron_bench.reaches", *(f"dextron_bench.reaches.{name}" for name in ("reach", "rotation", "timing"))),
     *("dextron_bench.storage", *(f"dextron_bench.storage.{name}" for name in ("atomic", "hashing", "tensors"))),
     *("dextron_bench.success", "dextron_bench.success.network"),
     *("dextron_bench.world", "dextron_bench.world.model", "dextron_bench.world.task"),
 }
+WORKER = ("dextron_bench.methods.isolation", "dextron_bench.methods.loading", "dextron_bench.methods.specs")
 SIMULATORS = ("mujoco", "dm_control")
 NETWORK = ("socket.connect", "socket.bind", "socket.send", "socket.getaddrinfo", "socket.gethostby")
-DATABASE = "sqlite3.connect"  # Whoever has one may attach any file to it.
-STARTING = ("subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "os.kill", "pty.")
-DIGGING = ("gc.get_", "sys._current_frames", "resource.")
+DATABASE = "sqlite3.connect"  # A database can attach any other file.
+PROCESSES = ("subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "os.kill", "pty.")
+INTROSPECTION = ("gc.get_", "sys._current_frames", "resource.")
 LISTING = ("os.listdir", "os.scandir")
-CHANGING = (  # Their arguments are paths, numbers, and last where there are any, folders by descriptor.
+CHANGING = (  # Arguments: paths, then numbers, then in some events the descriptors of the folders.
     *("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "os.mkfifo"),
     *("os.chmod", "os.chown", "os.utime", "os.setxattr", "shutil.rmtree", "shutil.move"),
 )
@@ -38,27 +39,31 @@ DEVICES = ("/dev/null", "/dev/urandom", "/dev/random", "/proc/cpuinfo", "/proc/m
 
 
 class NotForAgents(PermissionError):
-    """What an agent tried and may not."""
+    """An agent tried something that it may not do."""
 
-    def __init__(self, what: str) -> None:
-        super().__init__(f"agents may not {what}")
+    def __init__(self, action: str) -> None:
+        super().__init__(f"agents may not {action}")
 
 
-def close(own: Sequence[Path], scratch: Path) -> None:
-    """From now on this process reads only Python's own files and those in `own`, and writes only below `scratch`."""
-    hide()
+def install(readable: Sequence[Path], scratch: Path) -> None:
+    """Limits this process from now on: it reads Python's files and `readable`, and writes below `scratch` only."""
+    hide_simulator()
     package = Path(__file__).resolve().parents[2]
-    places = {sys.prefix, sys.base_prefix, sys.exec_prefix, *(entry for entry in sys.path if "-packages" in entry)}
-    allowed = [*places, *DEVICES, "/usr", "/lib", "/lib64", "/etc", package, package.parent / "baselines", *own]
-    hidden = [str(file) for file in sandbox.secrets()]
-    sys.addaudithook(_Guard([os.path.realpath(place) for place in allowed], os.path.realpath(scratch), hidden))
+    python = {sys.prefix, sys.base_prefix, sys.exec_prefix, *(entry for entry in sys.path if "-packages" in entry)}
+    system = (*DEVICES, "/usr", "/lib", "/lib64", "/etc")
+    allowed = [os.path.realpath(path) for path in (*python, *system, package, package.parent / "baselines", *readable)]
+    secrets = [str(file) for file in sandbox.secret_files()]
+    sys.addaudithook(_Guard(allowed, os.path.realpath(scratch), secrets))
 
 
-def hide() -> None:
-    """Takes the simulator out of this process's sight; what pure functions on states need of it is kept."""
-    for prepared in (model.proximal, model.command_gain, model.half_closed, model.state_names):
-        prepared()
+def hide_simulator() -> None:
+    """Removes the simulator from this process; caches the values that pure functions of states need from it."""
+    for cached in (model.proximal, model.command_gain, model.half_closed, model.state_names):
+        cached()
     model.load = model.mujoco = None  # type: ignore[assignment]
+    package = vars(sys.modules["dextron_bench"])
+    for name in [name for name, value in package.items() if _is_hidden(str(getattr(value, "__module__", "")))]:
+        del package[name]  # A public name that was used before: its module is hidden.
     for name in list(sys.modules):
         if _is_hidden(name):
             parent, _, last = name.rpartition(".")
@@ -67,21 +72,20 @@ def hide() -> None:
             del sys.modules[name]
 
 
-def _is_hidden(name: str) -> bool:
-    top = name.partition(".")[0]
-    own = name.startswith("dextron_bench.methods.isolation") or name == "dextron_bench.methods.loading"
-    return top in SIMULATORS or (top == "dextron_bench" and name not in PUBLIC and not own)
+def _is_hidden(module: str) -> bool:
+    top = module.partition(".")[0]
+    return top in SIMULATORS or (top == "dextron_bench" and module not in PUBLIC and not module.startswith(WORKER))
 
 
 class _Guard:
-    """The hook; raises NotForAgents."""
+    """The audit hook; raises NotForAgents."""
 
     def __init__(self, allowed: Sequence[str], scratch: str, secrets: Sequence[str]) -> None:
         self._allowed, self._scratch, self._secrets = tuple(allowed), scratch, frozenset(secrets)
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
         if event == "import" and _is_hidden(arguments[0]):
-            raise NotForAgents(f"import {arguments[0]}, by which the simulator and the splits are reached")
+            raise NotForAgents(f"import {arguments[0]}, which gives access to the simulator or the splits")
         if event == "open":
             self._check_open(*arguments)
         elif event in CHANGING:
@@ -91,38 +95,38 @@ class _Guard:
         elif event.startswith(NETWORK):
             raise NotForAgents(f"use the network ({event})")
         elif event == DATABASE:
-            raise NotForAgents("open databases, which write where they like")
-        elif event.startswith(STARTING):
+            raise NotForAgents("open databases: a database can write any file")
+        elif event.startswith(PROCESSES):
             raise NotForAgents(f"start or signal processes ({event})")
-        elif event.startswith(DIGGING):
+        elif event.startswith(INTROSPECTION):
             raise NotForAgents(f"search the process they run in ({event})")
 
     def _check_open(self, path: Any, mode: str | None, flags: int) -> None:
         if not _is_path(path):
             return  # A file descriptor.
-        place = os.path.realpath(os.fsdecode(path))
-        if mode is None and os.path.isdir(place) and not _within(place, self._scratch):
-            raise NotForAgents(f"open the folder {place}, from which files can be opened unseen")
-        if flags & WRITING and place != "/dev/null" and not _within(place, self._scratch):
-            raise NotForAgents(f"write {place}: only the folder they are started in is theirs")
-        self._check_read(place)
+        real = os.path.realpath(os.fsdecode(path))
+        if mode is None and os.path.isdir(real) and not _is_within(real, self._scratch):
+            raise NotForAgents(f"open the folder {real}: the hook does not see files that are opened through it")
+        if flags & WRITING and real != "/dev/null" and not _is_within(real, self._scratch):
+            raise NotForAgents(f"write {real}: they may write only in the folder that they start in")
+        self._check_read(real)
 
-    def _check_read(self, place: str) -> None:
-        if place in self._secrets:
-            raise NotForAgents(f"read {place}: settings and experts are not for agents")
-        if not any(_within(place, each) for each in (*self._allowed, self._scratch)):
-            raise NotForAgents(f"read {place}: only Python's files and their own folder are theirs")
+    def _check_read(self, path: str) -> None:
+        if path in self._secrets:
+            raise NotForAgents(f"read {path}: settings and experts are not for agents")
+        if not any(_is_within(path, folder) for folder in (*self._allowed, self._scratch)):
+            raise NotForAgents(f"read {path}: they may read only Python's files and their own folder")
 
     def _check_change(self, arguments: tuple[Any, ...], event: str) -> None:
-        places = [os.path.realpath(os.fsdecode(path)) for path in arguments if _is_path(path)]
-        beside = [each for each in arguments[-1:] if type(each) is int and each >= 0 and event != "os.truncate"]
-        if beside or not all(_within(place, self._scratch) for place in places):
-            raise NotForAgents(f"change files outside the folder they are started in ({event} {' '.join(places)})")
+        paths = [os.path.realpath(os.fsdecode(path)) for path in arguments if _is_path(path)]
+        descriptors = [last for last in arguments[-1:] if type(last) is int and last >= 0 and event != "os.truncate"]
+        if descriptors or not all(_is_within(path, self._scratch) for path in paths):
+            raise NotForAgents(f"change files outside the folder they start in ({event} {' '.join(paths)})")
 
 
 def _is_path(value: Any) -> bool:
     return isinstance(value, str | bytes | os.PathLike)
 
 
-def _within(place: str, folder: str) -> bool:
-    return place == folder or place.startswith(folder.rstrip("/") + "/")
+def _is_within(path: str, folder: str) -> bool:
+    return path == folder or path.startswith(folder.rstrip("/") + "/")

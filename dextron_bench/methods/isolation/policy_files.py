@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-KINDS = (".pt", ".onnx")
+from dextron_bench.methods.specs import POLICIES
 
 
 class BadPolicy(ValueError):
-    """A file that holds no policy of these kinds."""
+    """A file that holds no TorchScript or ONNX policy."""
 
 
 class FilePolicy:
@@ -21,7 +21,7 @@ class FilePolicy:
         self._function = function
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Has no memory."""
+        """Does nothing: the policy has no memory."""
 
     def act(self, states: np.ndarray) -> np.ndarray:
         """Actions (N, 1) for states (N, 48)."""
@@ -29,14 +29,14 @@ class FilePolicy:
 
 
 def load(file: Path) -> FilePolicy:
-    """The policy of a TorchScript (.pt) or ONNX (.onnx) file: (N, 48) to (N, 1); raises BadPolicy."""
-    makes = {".pt": _torchscript, ".onnx": _onnx}
-    if file.suffix not in makes:
-        raise BadPolicy(f"{file} is no policy: known kinds end in {', '.join(KINDS)}")
-    return FilePolicy(makes[file.suffix](file))
+    """The policy (N, 48) to (N, 1) of a TorchScript (.pt) or ONNX (.onnx) file; raises BadPolicy."""
+    loaders = {".pt": _load_torchscript, ".onnx": _load_onnx}
+    if file.suffix not in loaders:
+        raise BadPolicy(f"{file} is not a policy: a policy's file ends in {' or '.join(POLICIES)}")
+    return FilePolicy(loaders[file.suffix](file))
 
 
-def _torchscript(file: Path) -> Callable[[np.ndarray], np.ndarray]:
+def _load_torchscript(file: Path) -> Callable[[np.ndarray], np.ndarray]:
     import torch
 
     torch.set_num_threads(1)
@@ -44,7 +44,7 @@ def _torchscript(file: Path) -> Callable[[np.ndarray], np.ndarray]:
         module = torch.jit.load(str(file), map_location="cpu").eval()
     except (RuntimeError, ValueError) as error:
         reason = str(error).splitlines()[0]
-        raise BadPolicy(f"{file} is no TorchScript file ({reason}); torch.jit.save makes one") from error
+        raise BadPolicy(f"{file} is not a TorchScript file ({reason}); torch.jit.save writes one") from error
 
     def act(states: np.ndarray) -> np.ndarray:
         with torch.inference_mode():
@@ -53,7 +53,7 @@ def _torchscript(file: Path) -> Callable[[np.ndarray], np.ndarray]:
     return act
 
 
-def _onnx(file: Path) -> Callable[[np.ndarray], np.ndarray]:
+def _load_onnx(file: Path) -> Callable[[np.ndarray], np.ndarray]:
     try:
         import onnxruntime  # pyright: ignore[reportMissingImports]
     except ModuleNotFoundError as error:
@@ -62,7 +62,7 @@ def _onnx(file: Path) -> Callable[[np.ndarray], np.ndarray]:
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     try:
         session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # ONNX Runtime raises kinds of its own.
-        raise BadPolicy(f"{file} is no ONNX file that can be run ({str(error).splitlines()[0]})") from error
+    except Exception as error:  # ONNX Runtime has exception types of its own.
+        raise BadPolicy(f"{file} is not an ONNX file that can be run ({str(error).splitlines()[0]})") from error
     name = session.get_inputs()[0].name
     return lambda states: np.asarray(session.run(None, {name: states})[0])

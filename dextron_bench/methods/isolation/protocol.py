@@ -1,8 +1,9 @@
-"""The protocol between the benchmark and an agent's process: a line of JSON each way (docs/agents.md).
+"""The protocol between the benchmark and an agent's process: one line of JSON each way (docs/agents.md).
 
-The first line to the agent is `{"protocol": 1, "seed": 0, "episodes": 256}`, its answer `{"protocol": 1}`, to which it
-may add `"name"`. Each line after it is `{"reset": [rows], "states": [[48 numbers], ...]}`, a row an episode, and the
-answer `{"actions": [numbers]}`, one a row. Rows in `reset` begin a new episode. When its input ends, the agent ends.
+The benchmark first sends `{"protocol": 1, "seed": 0, "episodes": 256}`; the agent answers `{"protocol": 1}` and may add
+`"name"`. Each further line is `{"reset": [rows], "states": [[48 numbers], ...]}` with one row per episode, and its
+answer `{"actions": [numbers]}` has one number per row. Rows in `reset` begin a new episode. The agent ends when its
+input ends.
 """
 
 from __future__ import annotations
@@ -13,75 +14,75 @@ from typing import Any
 import numpy as np
 
 PROTOCOL = 1
-ROOM = 40  # [bytes] that an action may take in an answer.
-HEAD = 4096  # [bytes] that the rest of an answer may take.
+ACTION_SIZE = 40  # [bytes] that one action may take in an answer.
+HEAD_SIZE = 4096  # [bytes] that the rest of an answer may take.
 
 
 class BadAnswer(ValueError):
-    """A line that is no answer of this protocol."""
+    """A line that does not follow the protocol."""
 
 
-def greeting(seed: int, episodes: int) -> bytes:
-    """The first line to an agent."""
-    return _line({"protocol": PROTOCOL, "seed": seed, "episodes": episodes})
+def write_greeting(seed: int, episodes: int) -> bytes:
+    """The benchmark's first line."""
+    return _to_line({"protocol": PROTOCOL, "seed": seed, "episodes": episodes})
 
 
-def greeted(line: bytes) -> str:
-    """The name in an agent's first answer, empty where it has none; raises BadAnswer."""
-    found = _read(line)
-    if found.get("protocol") != PROTOCOL:
-        raise BadAnswer(f'its first line must be {{"protocol": {PROTOCOL}}}, not {_shown(line)}')
-    return str(found.get("name", ""))
+def read_greeting(line: bytes) -> str:
+    """The agent's name from its first line, empty if it gives none; raises BadAnswer."""
+    message = _from_line(line)
+    if message.get("protocol") != PROTOCOL:
+        raise BadAnswer(f'its first line must be {{"protocol": {PROTOCOL}}}, not {_quote(line)}')
+    return str(message.get("name", ""))
 
 
-def question(reset: list[int], states: np.ndarray) -> bytes:
-    """The line that asks for actions in states (N, 48); episodes in rows `reset` are new."""
-    return _line({"reset": reset, "states": states.tolist()})
+def write_question(reset: list[int], states: np.ndarray) -> bytes:
+    """The line that asks for actions in states (N, 48); rows `reset` begin a new episode."""
+    return _to_line({"reset": reset, "states": states.tolist()})
 
 
-def asked(line: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """The rows that begin a new episode and the states (N, 48) of a question; raises BadAnswer."""
-    found = _read(line)
-    return np.array(found["reset"], int), np.array(found["states"], float)
+def read_question(line: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """The rows that begin a new episode, and the states (N, 48), of a question; raises BadAnswer."""
+    message = _from_line(line)
+    return np.array(message["reset"], int), np.array(message["states"], float)
 
 
-def answer(actions: np.ndarray) -> bytes:
+def write_actions(actions: np.ndarray) -> bytes:
     """The line that answers with actions (N, 1) or (N,)."""
-    return _line({"actions": np.asarray(actions, float).reshape(len(actions)).tolist()})
+    return _to_line({"actions": np.asarray(actions, float).reshape(len(actions)).tolist()})
 
 
-def actions(line: bytes, count: int) -> np.ndarray:
-    """The actions (N, 1) of an answer for so many episodes; raises BadAnswer. They may be NaN or infinite."""
-    found = _read(line).get("actions")
-    if not isinstance(found, list) or not all(type(each) in (int, float) for each in found):
-        raise BadAnswer(f'an answer must be {{"actions": [numbers]}}, not {_shown(line)}')
-    if len(found) != count:
-        raise BadAnswer(f"it answered with {len(found)} actions for {count} states")
+def read_actions(line: bytes, count: int) -> np.ndarray:
+    """The actions (count, 1) of an answer, which may be NaN or infinite; raises BadAnswer."""
+    numbers = _from_line(line).get("actions")
+    if not isinstance(numbers, list) or not all(type(number) in (int, float) for number in numbers):
+        raise BadAnswer(f'an answer must be {{"actions": [numbers]}}, not {_quote(line)}')
+    if len(numbers) != count:
+        raise BadAnswer(f"it answered with {len(numbers)} actions for {count} states")
     try:
-        return np.array(found, float)[:, None]
+        return np.array(numbers, float)[:, None]
     except OverflowError as error:
         raise BadAnswer("it answered with a number that no float holds") from error
 
 
-def longest(count: int) -> int:
-    """The most bytes of an answer for so many episodes."""
-    return HEAD + ROOM * count
+def max_answer_size(count: int) -> int:
+    """The largest size [bytes] of an answer for `count` episodes."""
+    return HEAD_SIZE + ACTION_SIZE * count
 
 
-def _line(message: dict[str, Any]) -> bytes:
+def _to_line(message: dict[str, Any]) -> bytes:
     return json.dumps(message, separators=(",", ":")).encode() + b"\n"
 
 
-def _read(line: bytes) -> dict[str, Any]:
+def _from_line(line: bytes) -> dict[str, Any]:
     try:
-        found = json.loads(line)
+        message = json.loads(line)
     except (ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict):
-        raise BadAnswer(f"it wrote {_shown(line)} where a JSON object on one line was due")
-    return found
+        message = None
+    if not isinstance(message, dict):
+        raise BadAnswer(f"it wrote {_quote(line)} instead of a JSON object on one line")
+    return message
 
 
-def _shown(line: bytes) -> str:
+def _quote(line: bytes) -> str:
     text = line.decode(errors="replace").strip()
     return repr(text if len(text) <= 60 else f"{text[:60]}...")

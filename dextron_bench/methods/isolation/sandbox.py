@@ -1,7 +1,7 @@
-"""What an agent's process is put into: limits of its own, and, where bubblewrap is installed, a world without the rest.
+"""The command around an agent's process: limits on memory and files, and a sandbox if bubblewrap is installed.
 
-Inside there is no network, no other process, nothing to write but the agent's folder, and nothing to read but programs,
-Python's files, the benchmark less what tells of settings, and the agent's own files.
+In the sandbox there is no network and no other process. The agent can write only in its own folder. It can read only
+programs, Python's files, its own files, and this package without the files of settings and experts.
 """
 
 from __future__ import annotations
@@ -14,54 +14,44 @@ from functools import cache
 from pathlib import Path
 
 PROGRAMS = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc/ld.so.cache", "/etc/alternatives")
-SECRET = (
-    "splits",
-    "experts",
-    "real",
-    "synthetic",
-)  # What names of the package's data begin with that tell of settings.
-LARGEST = 256 * 2**20  # [bytes] of a file that an agent may write, what it says to stderr included.
+SECRET = ("splits", "experts", "real", "synthetic")  # The package's data files that begin so hold settings or experts.
+LARGEST_FILE = 256 * 2**20  # [bytes] of a file that an agent may write; its stderr is one such file.
 LIMITS = 'ulimit -c 0; ulimit -d "$1" && ulimit -f "$2" && shift 2 && exec "$@"'
 
 
-def wrap(words: Sequence[str], scratch: str, own: Sequence[str], memory: int) -> list[str]:
-    """The command with limits on memory and files [bytes], in a sandbox where there is one."""
-    limited = ["/bin/sh", "-c", LIMITS, "agent", str(memory // 1024), str(LARGEST // 512), *words]
+def wrap(command: Sequence[str], scratch: str, readable: Sequence[str], memory: int) -> list[str]:
+    """The command with limits on memory and files [bytes], in a sandbox if one is available."""
+    limited = ["/bin/sh", "-c", LIMITS, "agent", str(memory // 1024), str(LARGEST_FILE // 512), *command]
     if not Path("/bin/sh").exists():
-        return list(words)
-    return [*_sandbox(scratch, own), *limited] if is_here() else limited
+        return list(command)
+    return [*_bubblewrap(scratch, readable), *limited] if is_available() else limited
 
 
 @cache
-def is_here() -> bool:
-    """Whether bubblewrap is installed and may make what it is asked for."""
+def is_available() -> bool:
+    """True if bubblewrap is installed and works on this system; runs it once."""
     if not shutil.which("bwrap"):
         return False
-    words = ["bwrap", "--unshare-all", "--ro-bind", "/", "/", "--proc", "/proc", "--dev", "/dev", "/bin/sh", "-c", ":"]
-    return subprocess.run(words, capture_output=True, check=False).returncode == 0
+    mounts = ["--ro-bind", "/", "/", "--proc", "/proc", "--dev", "/dev"]
+    command = ["bwrap", "--unshare-all", *mounts, "/bin/sh", "-c", ":"]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
 
-def secrets() -> list[Path]:
-    """Files of the package that tell of settings, experts and reaches."""
+def secret_files() -> list[Path]:
+    """The package's files of settings, experts and reaches."""
     data = Path(__file__).resolve().parents[2] / "data"
     return sorted(file for file in data.iterdir() if file.name.startswith(SECRET))
 
 
-def _sandbox(scratch: str, own: Sequence[str]) -> list[str]:
+def _bubblewrap(scratch: str, readable: Sequence[str]) -> list[str]:
     package = Path(__file__).resolve().parents[2]
     installed = {entry for entry in sys.path if "-packages" in entry and Path(entry).exists()}
-    places = [
-        *PROGRAMS,
-        sys.base_prefix,
-        sys.prefix,
-        *sorted(installed),
-        str(package),
-        str(package.parent / "baselines"),
-    ]
-    words = ["bwrap", "--unshare-all", "--die-with-parent", "--new-session", "--proc", "/proc", "--dev", "/dev"]
-    words += ["--tmpfs", "/tmp"]
-    for place in [*places, *own]:
-        words += ["--ro-bind-try", place, place]
-    for file in secrets():
-        words += ["--ro-bind", "/dev/null", str(file)]
-    return [*words, "--bind", scratch, scratch, "--chdir", scratch, "--"]
+    code = (str(package), str(package.parent / "baselines"))
+    paths = [*PROGRAMS, sys.base_prefix, sys.prefix, *sorted(installed), *code]
+    command = ["bwrap", "--unshare-all", "--die-with-parent", "--new-session", "--proc", "/proc", "--dev", "/dev"]
+    command += ["--tmpfs", "/tmp"]
+    for path in [*paths, *readable]:
+        command += ["--ro-bind-try", path, path]
+    for file in secret_files():
+        command += ["--ro-bind", "/dev/null", str(file)]
+    return [*command, "--bind", scratch, scratch, "--chdir", scratch, "--"]

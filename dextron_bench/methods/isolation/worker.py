@@ -1,6 +1,7 @@
-"""The process of an agent written in Python: makes it from what it is told as JSON on the command line, and answers.
+"""The process of an agent written in Python: creates the agent that its command line describes, and answers questions.
 
-Installed methods are loaded before the guard closes, since their code is the user's own; all else after it.
+An installed method is imported before the guard is installed, because the user has chosen to install its code. All
+other code is imported after it.
 """
 
 from __future__ import annotations
@@ -8,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,60 +16,51 @@ import numpy as np
 
 from dextron_bench.methods import loading
 from dextron_bench.methods.isolation import guard, policy_files, protocol
+from dextron_bench.methods.specs import AgentSpec
 from dextron_bench.storage import tensors
 
-GROUP = "dextron_bench.methods"
 
-
-def main(told: dict[str, Any]) -> None:
-    """Serves the agent told of until the input ends."""
+def main(request: dict[str, Any]) -> None:
+    """Answers questions for the agent of a Launch, given as a dict with its `scratch` folder, until the input ends."""
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # What an agent prints is no answer.
+    os.dup2(2, 1)  # What an agent prints goes to stderr, not among the answers.
     questions = sys.stdin.buffer
-    installed = _installed(told["spec"]) if told["kind"] == "method" else None
-    guard.close([Path(place) for place in told["own"]], Path(told["scratch"]))
+    spec = AgentSpec(**request["spec"])
+    installed = loading.load_class(spec) if spec.kind == "method" else None
+    guard.install([Path(path) for path in request["readable"]], Path(request["scratch"]))
     seed = json.loads(questions.readline())["seed"]
-    agent = _made(told, installed, seed)
-    answers.write(json.dumps({"protocol": protocol.PROTOCOL, "name": told["spec"]}).encode() + b"\n")
+    agent = _create_agent(spec, installed, request["settings"], request["weights"], seed)
+    answers.write(json.dumps({"protocol": protocol.PROTOCOL, "name": str(spec)}).encode() + b"\n")
     answers.flush()
     serve(agent, questions, answers)
 
 
 def serve(agent: Any, questions: BinaryIO, answers: BinaryIO) -> None:
-    """Answers each question with an agent's `reset` and `act`."""
+    """Answers each question with the agent's `reset` and `act`."""
     for line in questions:
-        reset, states = protocol.asked(line)
+        reset, states = protocol.read_question(line)
         if len(reset):
             agent.reset(reset)
-        found = np.asarray(agent.act(states))
-        if found.shape != (len(states), 1) or found.dtype.kind != "f":
+        actions = np.asarray(agent.act(states))
+        if actions.shape != (len(states), 1) or actions.dtype.kind != "f":
             raise TypeError(
                 f"act() must return floats of shape ({len(states)}, 1) for states of shape {states.shape}; "
-                f"it returned {found.dtype} of shape {found.shape}"
+                f"it returned {actions.dtype} of shape {actions.shape}"
             )
-        answers.write(protocol.answer(found))
+        answers.write(protocol.write_actions(actions))
         answers.flush()
 
 
-def _installed(spec: str) -> Any:
-    """The class of an installed method, and all that making it needs."""
-    found = entry_points(group=GROUP, name=spec)
-    if not found:
-        raise LookupError(f"no method {spec!r} is installed")
-    return next(iter(found)).load()
-
-
-def _made(told: dict[str, Any], installed: Any, seed: int) -> Any:
-    """The agent, ready to act."""
-    if told["kind"] == "policy":
-        return policy_files.load(Path(told["spec"]))
-    found = installed or loading.find(told["spec"])
-    if not isinstance(found, type) or not hasattr(found, "name"):
-        raise LookupError(f"{told['spec']!r} is no class with a `name`")
-    method = found(**told["settings"])
-    if told["weights"]:
-        taught = getattr(method, "source_policy", method)
-        return taught.policy(tensors.read(Path(told["weights"])))
+def _create_agent(spec: AgentSpec, installed: Any, settings: dict[str, Any], weights: str, seed: int) -> Any:
+    if spec.kind == "policy":
+        return policy_files.load(Path(spec.location))
+    cls = installed or loading.load_class(spec)
+    if not isinstance(cls, type) or not hasattr(cls, "name"):
+        raise LookupError(f"{str(spec)!r} is not a class with a `name`")
+    method: Any = cls(**settings)
+    if weights:
+        learner = getattr(method, "source_policy", method)
+        return learner.policy(tensors.read(Path(weights)))
     return method.agent(seed)
 
 

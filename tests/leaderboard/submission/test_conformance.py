@@ -13,7 +13,7 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.leaderboard.submission.conformance import MEND, NOTE, OK, Check, checks
 from dextron_bench.methods.isolation.isolated_agent import Limits
-from dextron_bench.methods.isolation.launch import launch
+from dextron_bench.methods.isolation.launch import prepare_launch
 from tests.helpers import tiny_benchmark
 
 AGENT = """
@@ -52,7 +52,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def found(tmp_path: Path, act: str) -> dict[str, Check]:
     (tmp_path / "mine.py").write_text(AGENT.format(act=act))
-    return {check.what: check for check in checks(launch(f"{tmp_path}/mine.py:Agent"), limits=Limits(answer=20.0))}
+    return {
+        check.what: check for check in checks(prepare_launch(f"{tmp_path}/mine.py:Agent"), limits=Limits(answer=20.0))
+    }
 
 
 def test_the_agent_to_begin_with_is_ready_and_passes_its_own_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -85,7 +87,7 @@ def test_what_fails_ends_the_checks(tmp_path: Path):
     assert list(told) == ["it starts", "actions are finite, in [-1, 1], one a row"]
     assert "3 episodes failed: action 2 is outside [-1, 1] at step 0" in list(told.values())[1].found
     (tmp_path / "mine.py").write_text("import nothing_of_that_name")
-    (only,) = checks(launch(f"{tmp_path}/mine.py:Agent"))
+    (only,) = checks(prepare_launch(f"{tmp_path}/mine.py:Agent"))
     assert (only.what, only.verdict) == ("it starts", MEND)
     assert "nothing_of_that_name" in only.found
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.leaderboard.submission import playing, relaunch
+from dextron_bench.leaderboard.submission.entry import MANIFEST_KINDS
 from tests.helpers.forged_bundles import Forgery
 
 
@@ -83,9 +84,9 @@ def test_agents_of_each_kind_are_started_from_the_bundle(kind: str, spec: str, w
         (tmp_path / name).touch()
     told = {"kind": kind, "spec": spec, "settings": {}, "weights": weights}
     how = relaunch.launch_of(told, tmp_path)
-    assert (how.kind, how.command) == (kind, ())
     inside = kind == "policy" or ".py:" in spec
-    assert how.spec == (f"{tmp_path}/{spec}" if inside else spec)
+    assert (str(how.spec), how.command) == (f"{tmp_path}/{spec}" if inside else spec, ())
+    assert MANIFEST_KINDS[how.spec.kind] == kind
     assert how.weights == (f"{tmp_path}/{weights}" if weights else "")
 
 

@@ -22,8 +22,8 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import policy_files, protocol, sandbox
-from dextron_bench.methods.isolation.isolated_agent import Isolated, Limits
-from dextron_bench.methods.isolation.launch import launch
+from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent, Limits
+from dextron_bench.methods.isolation.launch import prepare_launch
 from dextron_bench.splits.loading import cases_from_frame
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.tiny_benchmark import ROWS
@@ -61,7 +61,7 @@ def made(tmp_path: Path) -> Callable[[str], str]:
 
 
 def play(spec: str, cases: list[Case] = CASES, **limits: float) -> list[Episode]:
-    with Isolated(launch(spec), limits=Limits(**limits)) as agent:  # pyright: ignore[reportArgumentType]
+    with IsolatedAgent(prepare_launch(spec), limits=Limits(**limits)) as agent:  # pyright: ignore[reportArgumentType]
         found = dict(rollout(agent, SOURCE, cases, slots=2, threads=1))
     return [found[index] for index in range(len(cases))]
 
@@ -102,8 +102,8 @@ def test_a_learners_file_can_be_its_agents_too(made: Callable[[str], str]):
         ("import mujoco", "agents may not import mujoco"),
         ("from dextron_bench.world import model; model.load()", "'NoneType' object is not callable"),
         ("import dextron_bench as d; open(d.__path__[0] + '/data/splits.json')", "settings and experts are not for"),
-        ("open('/etc/../root/.bashrc')", "only Python's files and their own folder are theirs"),
-        ("open(__file__, 'a')", "only the folder they are started in is theirs"),
+        ("open('/etc/../root/.bashrc')", "may read only Python's files and their own folder"),
+        ("open(__file__, 'a')", "may write only in the folder that they start in"),
         ("import os; os.remove(__file__)", "agents may not change files outside the folder"),
         ("import socket; socket.create_connection(('127.0.0.1', 9))", "agents may not use the network"),
         ("import subprocess; subprocess.run(['ls'])", "agents may not start or signal processes"),
@@ -124,7 +124,7 @@ def test_a_learners_file_can_be_its_agents_too(made: Callable[[str], str]):
         ("open('a', 'w').close(); import os; os.rename('a', '/tmp/stolen')", "agents may not change files outside"),
         ("import os; os.symlink('/etc', '/tmp/mine')", "agents may not change files outside the folder"),
         ("import shutil, os; shutil.rmtree(os.path.dirname(__file__))", "agents may not change files outside"),
-        ("import os; os.listdir('/root')", "only Python's files and their own folder are theirs"),
+        ("import os; os.listdir('/root')", "may read only Python's files and their own folder"),
         ("import resource; resource.prlimit(1, resource.RLIMIT_CORE)", "agents may not search the process"),
         ("raise ValueError('lost')", "ValueError: lost"),
         ("while True: pass", "it gave no answer within 1 s"),
@@ -137,7 +137,7 @@ def test_what_fails_or_is_forbidden_fails_its_episodes_and_is_told(act: str, why
         assert episode.failure.endswith(" at step 0")
 
 
-@pytest.mark.skipif(not sandbox.is_here(), reason="bubblewrap is not here")
+@pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not here")
 @pytest.mark.parametrize(
     "deed",
     [
@@ -200,7 +200,7 @@ def test_what_is_slow_in_all_is_stopped_for_good(made: Callable[[str], str]):
     ("line", "why"),
     [
         ("exit()", "did not start: it ended with code 0"),
-        ("print('hi', flush=True)", "where a JSON object on one line was due"),
+        ("print('hi', flush=True)", "instead of a JSON object on one line"),
         ("print('{}', flush=True)", 'its first line must be {"protocol": 1}'),
         ("print('x' * 10000, flush=True)", "its answer is longer than 4176 bytes"),
     ],
@@ -228,12 +228,13 @@ def test_a_program_in_any_language_plays(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("spec", "why"), [("exec:agent 'x", "is no command"), ("__main__:Agent", "is no module that agents can come from")]
+    ("spec", "why"),
+    [("exec:agent 'x", "is not a command"), ("__main__:Agent", "agents cannot come from the module __main__")],
 )
 def test_words_that_name_no_agent_are_told(spec: str, why: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)  # As it is in a program that was begun by its file.
     with pytest.raises(AgentError, match=why):
-        launch(spec)
+        prepare_launch(spec)
 
 
 def test_an_agent_is_given_time_and_memory():
@@ -256,9 +257,9 @@ def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
     for episode in play(str(file), CASES[:1]):
         np.testing.assert_allclose(episode.actions, np.tanh(0.25), atol=1e-7)
     torch.save({"weights": 1}, file)
-    with pytest.raises(AgentError, match="is no TorchScript file"):
+    with pytest.raises(AgentError, match="is not a TorchScript file"):
         play(str(file))
-    with pytest.raises(policy_files.BadPolicy, match=r"known kinds end in \.pt, \.onnx"):
+    with pytest.raises(policy_files.BadPolicy, match=r"file ends in \.pt or \.onnx"):
         policy_files.load(tmp_path / "policy.pkl")
 
 
@@ -282,21 +283,21 @@ def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):
         assert len(np.unique(expected)) > 10
         np.testing.assert_array_equal(episode.actions, expected)
     file.write_bytes(file.read_bytes()[:100])
-    with pytest.raises(AgentError, match="is no ONNX file that can be run"):
+    with pytest.raises(AgentError, match="is not an ONNX file that can be run"):
         play(str(file))
 
 
 @given(st.binary(max_size=200), st.integers(1, 5))
 def test_whatever_a_process_writes_is_actions_or_a_bad_answer(line: bytes, count: int):
     with suppress(protocol.BadAnswer):
-        assert protocol.actions(line, count).shape == (count, 1)
+        assert protocol.read_actions(line, count).shape == (count, 1)
 
 
 @given(st.lists(st.floats(), min_size=1, max_size=5))
 def test_actions_come_through_bit_for_bit(actions: list[float]):
     sent = np.array(actions)[:, None]
-    np.testing.assert_array_equal(protocol.actions(protocol.answer(sent), len(actions)), sent)
+    np.testing.assert_array_equal(protocol.read_actions(protocol.write_actions(sent), len(actions)), sent)
     states = np.array(actions)[:, None].repeat(48, axis=1)
-    rows, found = protocol.asked(protocol.question([0], states))
+    rows, found = protocol.read_question(protocol.write_question([0], states))
     assert rows.tolist() == [0]
     np.testing.assert_array_equal(found, states)

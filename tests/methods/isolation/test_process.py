@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.methods.isolation.process import Process, Silent
+from dextron_bench.methods.isolation.process import NoAnswer, Process
 
 ONCE = "print(input()); raise SystemExit(7)"
 CHATTER = "while True: print('more', flush=True)"
 
 
 def started(script: str, here: Path) -> Process:
-    return Process([sys.executable, "-c", script], str(here), room=100)
+    return Process([sys.executable, "-c", script], str(here), max_answer=100)
 
 
 def test_one_that_ended_between_two_questions_is_told_at_once(tmp_path: Path):
@@ -24,9 +24,9 @@ def test_one_that_ended_between_two_questions_is_told_at_once(tmp_path: Path):
     assert process.ask(b"first\n", 60.0) == b"first\n"
     while process._popen.poll() is None or process._answers.empty():
         time.sleep(0.01)
-    with pytest.raises(Silent, match="it ended") as told:
+    with pytest.raises(NoAnswer, match="it ended") as told:
         process.ask(b"second\n", 10_000.0)
-    assert process.epitaph(told.value) == "it ended with code 7"
+    assert process.describe_failure(told.value) == "it ended with code 7"
     process.kill()
 
 
@@ -35,7 +35,7 @@ def test_the_threads_of_one_that_says_too_much_end_with_it(tmp_path: Path):
     process = started(CHATTER, tmp_path)
     while not process._answers.full():
         time.sleep(0.01)
-    with pytest.raises(Silent, match="it wrote 5 bytes that nobody asked for"):
+    with pytest.raises(NoAnswer, match="it wrote 5 bytes that nobody asked for"):
         process.ask(b"first\n", 60.0)
     process.kill()
     late = time.monotonic() + 60.0
