@@ -1,0 +1,52 @@
+"""The learner of the tutorial trains, and a resumed training equals an unbroken one."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from dextron_bench import Track, load_split, open_source
+
+TUTORIALS = Path(__file__).parents[2] / "docs" / "tutorials"
+
+
+@pytest.fixture
+def search(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The tutorial's module."""
+    monkeypatch.syspath_prepend(TUTORIALS)
+    return import_module("search")
+
+
+@pytest.fixture
+def track(tmp_path: Path) -> Track:
+    """A few cases of minimum-jerk reaches."""
+    return Track(open_source("minjerk"), load_split("minjerk", "val").cases[:4], tmp_path, threads=1)
+
+
+def test_a_resumed_training_equals_an_unbroken_one(search: ModuleType, track: Track):
+    method = search.Search(preset="smoke", candidates=4, episodes=1)
+    unbroken, first, second = (method.trainer(track, [0]) for _ in range(3))
+    metrics = [unbroken.advance(), unbroken.advance()]
+    assert first.advance() == metrics[0]
+    second.restore(first.state(), [first.journal()])
+    assert second.epoch == 1
+    assert second.advance() == metrics[1]
+    for one, other in zip(unbroken.weights(), second.weights(), strict=True):
+        np.testing.assert_array_equal(one["mean"], other["mean"])
+
+
+def test_the_policy_opens_far_away_and_closes_near(search: ModuleType):
+    agent = search.Linear(np.array([1.0, -2.0, 0.0]))
+    states = np.zeros((2, 48))
+    states[:, 10] = 1.0  # The palm's quaternion: no rotation.
+    states[1, 0] = 1.0  # The bottle of the second row is a metre away.
+    np.testing.assert_array_equal(agent.act(states)[1], [-1.0])
+
+
+def test_settings_other_than_the_defaults_have_another_label(search: ModuleType):
+    labels = {search.Search().label, search.Search(preset="smoke").label, search.Search(candidates=8).label}
+    assert len(labels) == 3
