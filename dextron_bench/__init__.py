@@ -1,5 +1,94 @@
-"""A benchmark of grasping for a prosthetic hand that a person moves."""
+"""A benchmark of grasping with a prosthetic hand that a person moves.
+
+These names are the public API. Each is loaded at its first use, so that `import dextron_bench` stays quick. The import
+registers the environment `dextron_bench/Grasp-v0` with Gymnasium. Beside these names, the modules `world.gym`,
+`world.suite`, `world.model`, `world.task` and `success.network` are public; all other modules are private.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from dextron_bench.world.registration import register_environments
+
+if TYPE_CHECKING:
+    from dextron_bench.evaluation.diagnosis import diagnose
+    from dextron_bench.evaluation.episodes import Episode
+    from dextron_bench.evaluation.replay import replay
+    from dextron_bench.evaluation.rollout import rollout
+    from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+    from dextron_bench.methods.agents import Agent
+    from dextron_bench.methods.exact import Perceptron
+    from dextron_bench.methods.learners import Learner, Track, Trainer
+    from dextron_bench.reaches.setting import Setting
+    from dextron_bench.reaches.sources import open_source
+    from dextron_bench.recording.episode_file import read as read_recording
+    from dextron_bench.splits.loading import Split, load_split
+    from dextron_bench.success.network import SuccessModel
+    from dextron_bench.world.suite import load as load_environment
+
+    __version__: str
+
+__all__ = [
+    "Agent",
+    "Case",
+    "Episode",
+    "Expert",
+    "ExpertAgent",
+    "Learner",
+    "Perceptron",
+    "Setting",
+    "Split",
+    "SuccessModel",
+    "Track",
+    "Trainer",
+    "__version__",
+    "diagnose",
+    "load_environment",
+    "load_split",
+    "open_source",
+    "read_recording",
+    "replay",
+    "rollout",
+]
+
+_HOMES = {  # The module of each public name, and its name there if that differs.
+    "Agent": "methods.agents",
+    "Case": "experts.policies",
+    "Episode": "evaluation.episodes",
+    "Expert": "experts.policies",
+    "ExpertAgent": "experts.policies",
+    "Learner": "methods.learners",
+    "Perceptron": "methods.exact",
+    "Setting": "reaches.setting",
+    "Split": "splits.loading",
+    "SuccessModel": "success.network",
+    "Track": "methods.learners",
+    "Trainer": "methods.learners",
+    "diagnose": "evaluation.diagnosis",
+    "load_environment": "world.suite:load",
+    "load_split": "splits.loading",
+    "open_source": "reaches.sources",
+    "read_recording": "recording.episode_file:read",
+    "replay": "evaluation.replay",
+    "rollout": "evaluation.rollout",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("dextron-bench")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'dextron_bench' has no public name {name!r}; see dextron_bench.__all__")
+    module, _, other = _HOMES[name].partition(":")
+    value = getattr(import_module(f"dextron_bench.{module}"), other or name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
 
 register_environments()

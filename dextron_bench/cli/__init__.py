@@ -1,1 +1,1 @@
-"""The verbs of the command line: parsing and printing only. One small module each."""
+"""The commands of the command line: they parse and print only. Each has its own small module."""

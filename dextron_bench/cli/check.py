@@ -1,45 +1,45 @@
-"""`dextron-bench check`: whether an agent can be submitted, and what to mend."""
+"""`dextron-bench check`: verifies that an agent can be submitted."""
 
 from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_json
-
-DONE, DIFFERS = 0, 1
+from dextron_bench.reaches.sources import RankedSource
 
 
 @dataclass(frozen=True)
 class Check:
-    """Try an agent on a few episodes, in a process of its own as when it is submitted, and say what to mend.
+    """Try an agent on a few episodes, in a separate process as for a submission, and list what to fix.
 
-    AGENT is a method's name, module:Class, file.py:Class, FILE.pt (TorchScript), FILE.onnx, or 'exec:COMMAND' for a
-    program that speaks the protocol.
+    AGENT is the name of a method, module:Class, file.py:Class, FILE.pt (TorchScript), FILE.onnx, or 'exec:COMMAND' for
+    a program that implements the protocol.
 
     Example: dextron-bench check my_agent/agent.py:MyAgent
     """
 
     agent: tyro.conf.Positional[str]
-    """Which agent: see above."""
-    reaches: Literal["real", "synthetic"] = "synthetic"
+    """The agent; see above for its forms."""
+    reaches: RankedSource = "synthetic"
     """The source of reaches."""
     weights: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
-    """Weights of a method that learns."""
+    """Weights of a trained method."""
     settings: str = "{}"
-    """Settings of a method or class, as JSON, like '{"near": 0.05}'."""
+    """Settings of a method or class as JSON, such as '{"near": 0.05}'."""
     timeout: float = 10.0
-    """Seconds that one answer may take."""
+    """Time limit for one answer [s]."""
     memory: float = 4.0
-    """GiB of memory that the agent may take."""
+    """Memory limit of the agent [GiB]."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor."""
+    """Threads of the simulation; 0 means one per processor."""
     json: bool = False
-    """Print what was found as JSON."""
+    """Print the results of the checks as JSON."""
 
     def __call__(self) -> int:
         from dextron_bench.leaderboard.submission import conformance, entry

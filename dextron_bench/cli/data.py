@@ -67,15 +67,15 @@ class Info:
 
     def __call__(self) -> int:
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.reaches.summary import means, survey
+        from dextron_bench.reaches.summary import group_means, reach_table
 
         source = open_source(self.reaches)
-        found = survey(source)
+        found = reach_table(source)
         if self.json:
-            print_json(means(found, ["subject", "ring", "angle"]).to_dict("records"))
+            print_json(group_means(found, ["subject", "ring", "angle"]).to_dict("records"))
         else:
             for by in (["subject"], ["ring", "angle"]):
-                table = means(found, by)
+                table = group_means(found, by)
                 title = f"{len(found)} {self.reaches} reaches by {' and '.join(by)}"
                 columns = [*by, "reaches", "duration [s]", "length [m]", "speed [m/s]"]
                 rows = table[[*by, "reaches", "duration", "length", "speed"]].itertuples(index=False)

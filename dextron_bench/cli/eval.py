@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,7 +14,7 @@ from dextron_bench.cli.output import progress_bar
 from dextron_bench.cli.run import EPISODES_FAILED
 
 if TYPE_CHECKING:
-    from dextron_bench.runs.plans import Plan
+    from dextron_bench.runs import plans
 
 
 @dataclass(frozen=True)
@@ -52,30 +52,25 @@ class Eval:
         from dextron_bench.runs import execution, result_files
         from dextron_bench.scores import standings
 
-        plans = self._plans()
-        runs = self.runs / "eval"
-        found = []
-        for plan in plans:
-            with progress_bar(f"{plan.label}, seed {plan.seed}", self.quiet) as progress:
-                folder = execution.execute(plan, runs, self.threads, progress)
-            found.append(result_files.read_result(folder / result_files.RESULT))
-        rows = standings.table(found)
-        print_rows(rows[rows["split"].isin(plans[0].splits)], self.json)
+        runs = self._runs()
+        results = []
+        for run in runs:
+            with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:
+                execution.execute(run, self.runs / "eval", self.threads, progress)
+            results.append(result_files.read_result(run.folder(self.runs / "eval").result))
+        rows = standings.table(results)
+        print_rows(rows[rows["split"].isin(runs[0].splits)], self.json)
         return EPISODES_FAILED if rows["failed"].any() else 0
 
-    def _plans(self) -> list[Plan]:
-        """What to evaluate: a plan for each seed."""
-        from dextron_bench.methods import registry
-        from dextron_bench.methods import weights as methods_weights
-        from dextron_bench.runs import plans as runs_plans
-        from dextron_bench.splits.loading import ranking_splits
+    def _runs(self) -> list[plans.Run]:
+        """What to evaluate: a run for each seed."""
+        from dextron_bench.methods import weights as method_weights
+        from dextron_bench.runs.plans import Plan, resolve, with_shipped_weights
 
-        settings = chosen(self.settings)
-        names = self.split or ranking_splits(registry.run_source(registry.create(self.method, settings), self.reaches))
-        plan = runs_plans.Plan(self.method, self.reaches, names, 0, self.record, settings)
+        run = resolve(Plan(self.method, self.reaches, self.split, 0, self.record, chosen(self.settings)))
         if self.weights is None:
-            return runs_plans.shipped(plan, self.seed)
+            return with_shipped_weights(run, self.seed)
         if len(self.seed) > 1:
-            raise methods_weights.BadWeights("the weights of a file are those of one seed: give one --seed, or none")
-        seed = self.seed[0] if self.seed else methods_weights.seed(self.weights)
-        return [replace(plan, seed=seed, weights=self.weights)]
+            raise method_weights.BadWeights("a file holds the weights of one seed: give one --seed, or none")
+        seed = self.seed[0] if self.seed else method_weights.seed_of(self.weights)
+        return [run.with_weights(seed, self.weights)]

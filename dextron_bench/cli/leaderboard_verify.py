@@ -75,7 +75,7 @@ class Verify:
                 print("  its tier is now `re-run`")
         if self.stamp:
             build.build(self.board)
-        if problems := verify_board.pages(self.board):
+        if problems := verify_board.differing_files(self.board):
             print("tables and page: NOT what the results give", *problems, sep="\n  ")
         else:
             print("tables and page: computed again from the results, and equal")
@@ -128,9 +128,7 @@ def _verified(opened: tuple[Path, dict[str, Any]], board: Path, rerun: bool, thr
     from dextron_bench.leaderboard.submission import verification
 
     with progress_bar("verifying", quiet) as progress:
-        return verification.verify(
-            *opened, board, rerun, threads, report=lambda what, done, total: progress(done, total, what)
-        )
+        return verification.verify(*opened, board, rerun, threads, report=progress)
 
 
 def told(verdict: Verdict) -> int:

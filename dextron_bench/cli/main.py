@@ -1,7 +1,7 @@
-"""The command line: which verbs there are, and how what goes wrong becomes a line and an exit code.
+"""The command line: the table of commands, and how an error becomes one line and an exit code.
 
-A verb is a frozen dataclass: its fields are the flags, its docstring the help, its call the work. Modules of
-verbs import nothing heavy, so that help is quick.
+A command is a frozen dataclass: its fields are the flags, its docstring is the help, and its call does the work. The
+modules of commands import nothing heavy, so that `--help` is quick.
 """
 
 from __future__ import annotations
@@ -39,21 +39,22 @@ from dextron_bench.cli import (
 )
 from dextron_bench.cli import eval as evaluation
 from dextron_bench.cli import list as listing
+from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 
 
 class Command(Protocol):
-    """Does its work when called, and returns the exit code."""
+    """Does its work when it is called, and returns the exit code."""
 
     def __call__(self) -> int: ...
 
 
-Group = tuple[str, dict[str, type[Command]]]  # What a group of verbs is about, and its verbs.
+Group = tuple[str, dict[str, type[Command]]]  # The description of a group of commands, and its commands.
 
 COMMANDS: dict[str, type[Command] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
     "leaderboard": (
-        "The leaderboard: show that of a folder of runs; build, serve and verify the published one; add to it.",
+        "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard, or add to it.",
         {
             **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
             **{"verify": leaderboard_verify.Verify, "add": leaderboard_verify.Add},
@@ -65,12 +66,12 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "compare": compare.Compare,
     "view": view.View,
     "recordings": (
-        "Recordings: list them, export one as a film or a table, choose a few of the runs'.",
+        "Recordings: list them, export one as a film or a table, choose a few from the runs.",
         {"list": recordings.List, "export": recordings.Export, "choose": recordings_choose.Choose},
     ),
     "list": listing.List,
     "data": (
-        "Reaches: import or fetch the recorded ones, see what a source holds, fit and judge the synthetic ones; "
+        "Reaches: import or download the recorded ones, describe a source, fit and evaluate the synthetic ones; "
         "export episodes for offline learning.",
         {
             **{"import": data.Import, "fetch": data.Fetch, "info": data.Info},
@@ -80,25 +81,24 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "mc": mc.MonteCarlo,
     "splits": splits.Splits,
     "success": (
-        "The success model: play its data set, train it, judge it, explain episodes by it.",
+        "The success model: generate its data set, train it, evaluate it, explain episodes with it.",
         {"data": success.Data, "train": success.Train, "eval": success_eval.Eval, "explain": success_eval.Explain},
     ),
     "figures": figures.Figures,
     "doctor": doctor.Doctor,
 }
 
-DONE, DIFFERS, USAGE, EPISODES_FAILED, BUG, INTERRUPTED = 0, 1, 2, 3, 70, 130  # Exit codes.
-BLAS = "OPENBLAS_NUM_THREADS"  # NumPy's products are small here: threads would mostly wait for each other.
-OWN = ("dextron_bench", "baselines")  # Exceptions defined here are messages to the user.
+BLAS = "OPENBLAS_NUM_THREADS"  # NumPy's products are small here, so more threads would mostly wait for each other.
+PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
 DESCRIPTION = """Grasping with a prosthetic hand that a person moves: a benchmark.
 
 Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or input, 3 some episodes failed,
-130 interrupted. With --debug, or DEXTRON_DEBUG set, errors show where they came from."""
+130 interrupted. With --debug, or if DEXTRON_DEBUG is set, an error shows its traceback."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one verb and returns its exit code; `arguments` default to the process's own."""
-    os.environ.setdefault(BLAS, "1")  # Before NumPy is imported.
+    """Runs one command and returns its exit code; `arguments` default to those of the process."""
+    os.environ.setdefault(BLAS, "1")  # Must be set before the import of NumPy.
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words or bool(os.environ.get("DEXTRON_DEBUG"))
     words = [word for word in words if word != "--debug"]
@@ -108,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _parse(words)()
         sys.stdout.flush()
         return code
-    except BrokenPipeError:  # Whoever read the results has seen enough, as `| head` does.
+    except BrokenPipeError:  # The reader of the results has stopped, as `| head` does.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
     except (KeyboardInterrupt, Exception) as error:
@@ -120,60 +120,61 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def explain(error: BaseException) -> tuple[int, str]:
-    """Exit code and one line for what ended a verb."""
+    """The exit code and the line on stderr for an error that ended a command."""
     text = " ".join(str(error.args[0] if isinstance(error, KeyError) and error.args else error).split())
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED, "interrupted"
-    if type(error).__module__.split(".")[0] in OWN:
+    if type(error).__module__.split(".")[0] in PACKAGES:
         return USAGE, text
     if isinstance(error, OSError):
         reason = error.strerror or text
         return USAGE, f"{reason}: {error.filename}" if error.filename else reason
     if isinstance(error, ModuleNotFoundError):
         return USAGE, f"{text}; `dextron-bench doctor` shows what is missing"
-    return BUG, f"unexpected {type(error).__name__}: {text}; --debug shows where, and a report would be welcome"
+    return BUG, f"unexpected {type(error).__name__}: {text}; --debug shows the traceback; please report it"
 
 
-def _parse(words: Sequence[str]) -> Command:
-    """The verb that words ask for; wrong ones end the process with a line and code 2."""
-    if words and words[0] in method_flags.COMMANDS:
-        verbs: dict[str, Any] = {**COMMANDS, words[0]: method_flags.widen(words, COMMANDS[words[0]])}
-        with method_flags.as_bad_settings(words):
-            return _told(verbs, words)
-    return _told(COMMANDS, words)
+def _parse(arguments: Sequence[str]) -> Command:
+    """The command that the arguments select; wrong arguments end the process with one line and code 2."""
+    if arguments and arguments[0] in method_flags.COMMANDS:
+        command = method_flags.with_method_settings(arguments, COMMANDS[arguments[0]])
+        commands: dict[str, Any] = {**COMMANDS, arguments[0]: command}
+        with method_flags.as_bad_settings(arguments):
+            return _parse_commands(commands, arguments)
+    return _parse_commands(COMMANDS, arguments)
 
 
-def _told(verbs: Mapping[str, type[Command] | Group], words: Sequence[str]) -> Command:
-    """The verb; what is wrong with words is told in a line, where tyro has a frame of many."""
-    said = io.StringIO()
+def _parse_commands(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str]) -> Command:
+    """The command; prints one line about wrong arguments instead of the box that tyro draws."""
+    message = io.StringIO()
     try:
-        with redirect_stderr(said):
-            return tyro.cli(_union(verbs), prog="dextron-bench", description=DESCRIPTION, args=words)
+        with redirect_stderr(message):
+            return tyro.cli(_union(commands), prog="dextron-bench", description=DESCRIPTION, args=arguments)
     except SystemExit as ended:
         if ended.code:
-            verb = " ".join(["dextron-bench", *_named(verbs, words)])
-            print(f"dextron-bench: {method_flags.in_a_line(said.getvalue())}; see `{verb} --help`", file=sys.stderr)
+            name = " ".join(["dextron-bench", *_command_name(commands, arguments)])
+            print(f"dextron-bench: {method_flags.one_line(message.getvalue())}; see `{name} --help`", file=sys.stderr)
         raise
 
 
-def _named(verbs: Mapping[str, type[Command] | Group], words: Sequence[str]) -> list[str]:
-    """The verb that words begin with: its name, behind that of its group if it is in one."""
-    if not words or words[0] not in verbs:
+def _command_name(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str]) -> list[str]:
+    """The name of the command that the arguments start with, after the name of its group if it has one."""
+    if not arguments or arguments[0] not in commands:
         return []
-    verb = verbs[words[0]]
-    return [words[0], *(_named(verb[1], words[1:]) if isinstance(verb, tuple) else ())]
+    command = commands[arguments[0]]
+    return [arguments[0], *(_command_name(command[1], arguments[1:]) if isinstance(command, tuple) else ())]
 
 
-def _union(verbs: Mapping[str, type[Command] | Group]) -> Any:
-    """The table of verbs as the type that tyro makes subcommands of."""
-    named: list[Any] = []
-    for name, verb in verbs.items():
-        if isinstance(verb, tuple):
-            about, inner = verb
-            named.append(Annotated[_union(inner), tyro.conf.subcommand(name, description=about)])
+def _union(commands: Mapping[str, type[Command] | Group]) -> Any:
+    """The table of commands as the union type that tyro turns into subcommands."""
+    types: list[Any] = []
+    for name, command in commands.items():
+        if isinstance(command, tuple):
+            description, members = command
+            types.append(Annotated[_union(members), tyro.conf.subcommand(name, description=description)])
         else:
-            named.append(Annotated[verb, tyro.conf.subcommand(name)])
-    return Union[tuple(named)]  # noqa: UP007 (built at run time)
+            types.append(Annotated[command, tyro.conf.subcommand(name)])
+    return Union[tuple(types)]  # noqa: UP007 (built at run time)
 
 
 def _print_version() -> int:
@@ -182,7 +183,7 @@ def _print_version() -> int:
     try:
         print(f"dextron-bench {version('dextron-bench')}")
     except PackageNotFoundError:
-        print("dextron-bench, run from its source without being installed")
+        print("dextron-bench, not installed: it runs from its source")
     return DONE
 
 

@@ -1,9 +1,9 @@
-"""A method's settings as flags: `run --method rlil` has those of RLIL beside its own."""
+"""Adds the settings of a method to the flags of a command: `run --method rlil` also has the flags of RLIL."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import groupby
@@ -11,80 +11,83 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-COMMANDS = ("run", "eval")  # Those that take a method's settings.
-RULE = "-"  # Divides what tyro says.
+COMMANDS = ("run", "eval")  # They take the settings of a method.
+RULE = "-"  # Separates the parts of tyro's messages.
 ALL, METHOD = "--all", "--method"
 
 
 @dataclass(frozen=True)
 class Length:
-    """What all methods that train have in common."""
+    """The setting that all methods with training share."""
 
     preset: Literal["paper", "quick", "smoke"] = "paper"
     """How long methods train."""
 
 
-def widen(words: Sequence[str], verb: Any) -> Any:
-    """The verb with a field `settings` of the method that its words name; the verb itself where there are none.
+def with_method_settings(arguments: Sequence[str], command: Any) -> Any:
+    """The command with a field `settings` for the method that the arguments name; unchanged if it has no settings.
 
     Raises UnknownMethod, BadSettings.
     """
-    spec = _chosen(words)
-    if ALL in words and words[0] == "run":
-        return _with(verb, Length, Length)
-    if spec is None or not spec:
-        return verb
+    spec = _method_spec(arguments)
+    if ALL in arguments and arguments[0] == "run":
+        return _with_settings(command, Length)
+    if not spec:
+        return command
     from dextron_bench.methods import registry
 
-    found = registry.find_method(spec)
-    if not dataclasses.is_dataclass(found) or not dataclasses.fields(found):
-        return verb
-    own = {field.name for field in dataclasses.fields(verb)}
-    if taken := [field.name for field in dataclasses.fields(found) if field.name in own]:
+    method = registry.find_method(spec)
+    if not dataclasses.is_dataclass(method) or not dataclasses.fields(method):
+        return command
+    flags = {field.name for field in dataclasses.fields(command)}
+    if taken := [field.name for field in dataclasses.fields(method) if field.name in flags]:
         raise registry.BadSettings(
-            f"method {spec!r} has a setting {taken[0]!r}, which is a flag of {words[0]!r} itself"
+            f"method {spec!r} has a setting {taken[0]!r}, but {arguments[0]!r} already has a flag of this name"
         )
-    return _with(verb, found, found)
+    return _with_settings(command, method)
 
 
 @contextmanager
-def as_bad_settings(words: Sequence[str]) -> Iterator[None]:
-    """Makes what a method's class raises while settings are read BadSettings."""
+def as_bad_settings(arguments: Sequence[str]) -> Iterator[None]:
+    """Turns any error of a method's class into BadSettings while its settings are parsed."""
     try:
         yield
     except Exception as error:
         from dextron_bench.methods import registry
 
-        raise registry.BadSettings(f"method {_chosen(words)!r}: {' '.join(str(error).split())}") from error
+        raise registry.BadSettings(f"method {_method_spec(arguments)!r}: {' '.join(str(error).split())}") from error
 
 
-def in_a_line(framed: str) -> str:
-    """What a frame of tyro's says, drawn in lines or in ASCII; its title and help on the flag are left out."""
-    rows = [row.strip(" │─╭╮╰╯") or RULE for row in framed.replace("╮", f"\n{RULE}").splitlines() if row.strip()]
+def one_line(box: str) -> str:
+    """The message in a box that tyro draws with lines or in ASCII, without its title and without help on the flag."""
+    rows = [row.strip(" │─╭╮╰╯") or RULE for row in box.replace("╮", f"\n{RULE}").splitlines() if row.strip()]
     parts = [" ".join(part) for rule, part in groupby(rows, lambda row: not row.strip(RULE)) if not rule]
-    told = [part.rstrip(".") for part in parts[1:] if not part.startswith(("Argument helptext", "For full helptext"))]
-    return "; ".join(told) or " ".join(framed.split())
+    messages = [
+        part.rstrip(".") for part in parts[1:] if not part.startswith(("Argument helptext", "For full helptext"))
+    ]
+    return "; ".join(messages) or " ".join(box.split())
 
 
-def chosen(settings: Any) -> dict[str, Any]:
-    """The values of a verb's field `settings`."""
+def settings_dict(settings: Any) -> dict[str, Any]:
+    """The values of a command's field `settings`, by name."""
     return {} if settings is None else {f.name: getattr(settings, f.name) for f in dataclasses.fields(settings)}
 
 
-def _chosen(words: Sequence[str]) -> str | None:
+def _method_spec(arguments: Sequence[str]) -> str | None:
     """The value of the last --method."""
-    found = None
-    for word, after in zip(words, [*words[1:], ""], strict=True):
-        if word == METHOD:
-            found = after
-        elif word.startswith(f"{METHOD}="):
-            found = word.partition("=")[2]
-    return found
+    spec = None
+    for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
+        if argument == METHOD:
+            spec = following
+        elif argument.startswith(f"{METHOD}="):
+            spec = argument.partition("=")[2]
+    return spec
 
 
-def _with(verb: type, settings: type, default: Callable[[], Any]) -> type:
+def _with_settings(command: type, settings: type) -> type:
+    """A subclass of the command whose field `settings` has the flags of `settings`."""
     flat = Annotated[settings, tyro.conf.arg(name="")]
-    field = ("settings", flat, dataclasses.field(default_factory=default))
-    made = dataclasses.make_dataclass(verb.__name__, [field], bases=(verb,), frozen=True, kw_only=True)
-    made.__doc__ = verb.__doc__
-    return made
+    field = ("settings", flat, dataclasses.field(default_factory=settings))
+    subclass = dataclasses.make_dataclass(command.__name__, [field], bases=(command,), frozen=True, kw_only=True)
+    subclass.__doc__ = command.__doc__
+    return subclass

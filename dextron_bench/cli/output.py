@@ -1,4 +1,4 @@
-"""How verbs speak: results on stdout, progress on stderr."""
+"""What commands print: results on stdout, progress on stderr."""
 
 from __future__ import annotations
 
@@ -6,72 +6,61 @@ import json
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
-WIDE = 1000  # Columns that a table may take off a terminal, where nothing is folded for want of room.
-RATE_OVER = 300.0  # [s] over which rate and time left are estimated; a search's blocks take up to a minute.
+from dextron_bench.storage.progress import Progress, no_progress
+
+WIDTH = 1000  # Columns of a table that is not printed on a terminal, so that no cell is folded.
+RATE_PERIOD = 300.0  # [s] for the estimate of rate and time left; a block of a search takes up to a minute.
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """A table on stdout; numbers are set right."""
+    """Prints a table on stdout; columns of numbers are right-aligned."""
     from rich.console import Console
     from rich.table import Table
 
     rows = [list(row) for row in rows]
     table = Table(title=title, title_justify="left")
-    for place, column in enumerate(columns):
-        numbers = all(isinstance(row[place], (int, float)) for row in rows)
+    for index, column in enumerate(columns):
+        numbers = all(isinstance(row[index], (int, float)) for row in rows)
         table.add_column(column, justify="right" if numbers else "left", overflow="fold")
     for row in rows:
         table.add_row(*(f"{cell:.3f}" if isinstance(cell, float) else str(cell) for cell in row))
-    console = Console(width=None if sys.stdout.isatty() else WIDE, soft_wrap=not sys.stdout.isatty(), markup=False)
-    with console.capture() as captured:  # Rich itself would end the process where a reader has left.
+    console = Console(width=None if sys.stdout.isatty() else WIDTH, soft_wrap=not sys.stdout.isatty(), markup=False)
+    with console.capture() as captured:  # Rich would end the process if the reader of a pipe has left.
         console.print(table)
     print(captured.get(), end="")
 
 
 def print_json(value: Any) -> None:
-    """A value for programs on stdout."""
+    """Prints a value as JSON on stdout."""
     print(json.dumps(value, indent=1))
 
 
-class Told(Protocol):
-    """Hears how far something is, and how it goes."""
-
-    def __call__(self, done: int, total: int, note: str = "") -> None: ...
-
-
 @contextmanager
-def progress_bar(title: str, quiet: bool = False) -> Iterator[Told]:
-    """A bar with count, rate and time left on stderr, told of (done, all); silent when quiet or off a terminal."""
+def progress_bar(title: str, quiet: bool = False) -> Iterator[Progress]:
+    """Shows a bar with count, rate and time left on stderr; shows nothing if `quiet` or if stderr is no terminal."""
     if quiet or not sys.stderr.isatty():
-        yield lambda done, total, note="": None
+        yield no_progress
         return
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress as rich
 
     columns = (
-        *(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}")),
-        *(TimeElapsedColumn(), TextColumn("gone,"), TimeRemainingColumn(), TextColumn("left")),
-        TextColumn("{task.fields[note]}"),
+        *(rich.TextColumn("{task.description}"), rich.BarColumn(), rich.MofNCompleteColumn()),
+        *(rich.TextColumn("{task.fields[rate]}"), rich.TimeElapsedColumn(), rich.TextColumn("elapsed,")),
+        *(rich.TimeRemainingColumn(), rich.TextColumn("left"), rich.TextColumn("{task.fields[note]}")),
     )
-    with Progress(*columns, console=Console(stderr=True), speed_estimate_period=RATE_OVER) as bars:
+    with rich.Progress(*columns, console=Console(stderr=True), speed_estimate_period=RATE_PERIOD) as bars:
         task = bars.add_task(title, total=None, rate="", note="")
 
-        def told(done: int, total: int, note: str = "") -> None:
+        def report(done: int, total: int, note: str = "") -> None:
             bars.update(task, completed=done, total=total or None, note=note)
             bars.update(task, rate=_rate(bars.tasks[0].speed))
 
-        yield told
+        yield report
 
 
 def _rate(speed: float | None) -> str:
-    """A speed [1/s] with two or three digits; nothing while it is not known."""
+    """A speed [1/s] with two or three digits; empty if it is unknown."""
     return "" if speed is None else f"{speed:.0f}/s" if speed >= 100 else f"{speed:.2g}/s"

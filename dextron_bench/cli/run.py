@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,7 +13,7 @@ from dextron_bench.cli.method_flags import chosen
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from dextron_bench.runs.plans import Plan
+    from dextron_bench.runs import plans
 
 EPISODES_FAILED = 3
 
@@ -61,43 +61,39 @@ class Run:
         groups = self._groups()
         return self._foretell(groups) if self.dry_run else self._execute(groups)
 
-    def _groups(self) -> list[list[Plan]]:
+    def _groups(self) -> list[list[plans.Run]]:
         """What to run: methods, each with its seeds."""
         from dextron_bench.methods import registry
-        from dextron_bench.runs import plans as runs_plans
-        from dextron_bench.splits.loading import ranking_splits
+        from dextron_bench.runs.plans import Plan, resolve
 
-        asked = registry.paper(**chosen(self.settings)) if self.all else [(self.method, chosen(self.settings))]
-        plans = [runs_plans.Plan(spec, self.reaches, self.split, 0, self.record, settings) for spec, settings in asked]
-        reaches = self.reaches if self.all else plans[0].source
-        plans += [
-            runs_plans.Plan(name, reaches, self.split, 0)
-            for name in registry.FLOORS
-            if self.floors and name != self.method
-        ]
-        plans = [replace(plan, splits=plan.splits or ranking_splits(plan.source)) for plan in plans]
-        return [[replace(plan, seed=seed) for seed in dict.fromkeys(self.seed)] for plan in plans]
+        settings = chosen(self.settings)
+        methods = registry.paper_methods(**settings) if self.all else [(self.method, settings)]
+        runs = [resolve(Plan(spec, self.reaches, self.split, 0, self.record, flags)) for spec, flags in methods]
+        reaches = self.reaches if self.all else runs[0].source
+        floors = [name for name in registry.FLOORS if self.floors and name != self.method]
+        runs += [resolve(Plan(name, reaches, self.split)) for name in floors]
+        return [[run.with_seed(seed) for seed in dict.fromkeys(self.seed)] for run in runs]
 
-    def _execute(self, groups: list[list[Plan]]) -> int:
+    def _execute(self, groups: list[list[plans.Run]]) -> int:
         from dextron_bench.runs import execution, result_files
         from dextron_bench.scores import standings
 
-        found = []
-        for plans in groups:
-            with progress_bar(f"{plans[0].label}, epochs", self.quiet) as progress:
-                execution.learn(plans, self.runs, self.threads, self.device, progress)
-            for plan in plans:
-                with progress_bar(f"{plan.label}, seed {plan.seed}", self.quiet) as progress:
-                    folder = execution.execute(plan, self.runs, self.threads, progress)
-                found.append(result_files.read_result(folder / result_files.RESULT))
-                if plan.record and not self.json:
+        results = []
+        for group in groups:
+            with progress_bar(f"{group[0].label}, epochs", self.quiet) as progress:
+                execution.train(group, self.runs, self.threads, self.device, progress)
+            for run in group:
+                with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:
+                    folder = execution.execute(run, self.runs, self.threads, progress)
+                results.append(result_files.read_result(run.folder(self.runs).result))
+                if run.plan.record and not self.json:
                     print(f"{folder}: results, provenance and recordings; open one with `dextron-bench view {folder}`")
-        rows = standings.table(found)
-        rows = rows[rows["split"].isin({name for plans in groups for name in plans[0].splits})]
+        rows = standings.table(results)
+        rows = rows[rows["split"].isin({name for group in groups for name in group[0].splits})]
         print_rows(rows, self.json)
         return EPISODES_FAILED if rows["failed"].any() else 0
 
-    def _foretell(self, groups: list[list[Plan]]) -> int:
+    def _foretell(self, groups: list[list[plans.Run]]) -> int:
         from dextron_bench.runs.estimates import estimate
 
         rows = estimate(groups, self.runs, self.threads, self.device)

@@ -88,10 +88,9 @@ class Submit:
         from dextron_bench.runs import result_files
         from dextron_bench.scores import standings
         from dextron_bench.splits.loading import ranking_splits
+        from dextron_bench.storage.run_folder import RunFolder
 
-        own = [
-            result_files.read_result(folder / f"seed{seed}" / result_files.RESULT) for seed in dict.fromkeys(self.seed)
-        ]
+        own = [result_files.read_result(RunFolder.of_seed(folder, seed).result) for seed in dict.fromkeys(self.seed)]
         others = (each for each in result_files.results(self.board / collect.RESULTS) if each["method"] != self.name)
         rows = standings.table([*own, *(each for each in others if each["reaches"] == self.reaches)])
         return rows[rows["split"].isin(ranking_splits(self.reaches))]

@@ -1,4 +1,4 @@
-"""The published leaderboard: results, curves and weights taken over from runs, and what is made of them."""
+"""Builds the leaderboard from its results: tables, Markdown, learning curves and the page."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 
 import pandas as pd
 
+from dextron_bench.leaderboard import readme
 from dextron_bench.leaderboard.collect import RESULTS
-from dextron_bench.leaderboard.readme import _insert, _picture, _sections
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
 from dextron_bench.storage import atomic
-from dextron_bench.training.jobs import CURVE
+from dextron_bench.storage.run_folder import run_folders
 
-MADE = ("tier", "frames", "demonstrations", "seconds", "hardware", "privileged")
+ORIGIN = ("tier", "frames", "demonstrations", "seconds", "hardware", "privileged")
 Curves = dict[int, pd.DataFrame]  # By seed; columns epoch, return, success.
 
 
-def build(into: Path) -> list[Path]:
-    """Makes the table (CSV, JSON), its short form in the README, learning curves and the page from the results.
+def build(board: Path) -> list[Path]:
+    """Writes table (CSV, JSON), README tables, pictures of learning curves and page into a leaderboard's folder.
 
     The page links to recordings in the folder beside. Returns the files; raises DamagedFile, BrokenRecording.
     """
@@ -29,42 +29,44 @@ def build(into: Path) -> list[Path]:
     from dextron_bench.leaderboard.highlights import FOLDER
     from dextron_bench.scores import figures
 
-    results = list(result_files.results(into / RESULTS))
+    results = list(result_files.results(board / RESULTS))
     rows = standings.table(results)
-    known = _whole(rows, results)
-    made = [into / "table.csv", into / "README.md", into / "table.json"]
-    atomic.write_atomically(made[0], lambda part: known.to_csv(part, index=False, float_format="%.6g"))
-    atomic.write_atomically(made[2], lambda part: known.to_json(part, orient="records", indent=1))
+    table = _with_origin(rows, results)
+    files = [board / "table.csv", board / "README.md", board / "table.json"]
+    atomic.write_atomically(files[0], lambda part: table.to_csv(part, index=False, float_format="%.6g"))
+    atomic.write_atomically(files[2], lambda part: table.to_json(part, orient="records", indent=1))
     curves: dict[str, dict[str, Curves]] = defaultdict(dict)
-    for (method, reaches), found in learning_curves(into / RESULTS).items():
-        curves[reaches][method] = found
-    _insert(made[1], "\n".join(_sections(known, set(curves))))
-    for reaches, found in curves.items():
-        made.append(into / _picture(reaches))
-        figures.learning_curves(found, rows[rows["reaches"] == reaches], made[-1])
-    made.append(into / page.FILE)
-    text = page.document(rows, results, curves, into.resolve().parent / FOLDER)
-    atomic.write_atomically(made[-1], lambda part: part.write_text(text, encoding="utf-8"))
-    return made
+    for (method, reaches), by_seed in learning_curves(board / RESULTS).items():
+        curves[reaches][method] = by_seed
+    readme.insert(files[1], "\n".join(readme.sections(table, set(curves))))
+    for reaches, by_method in curves.items():
+        files.append(board / readme.picture(reaches))
+        figures.learning_curves(by_method, rows[rows["reaches"] == reaches], files[-1])
+    files.append(board / page.FILE)
+    text = page.document(rows, results, curves, board.resolve().parent / FOLDER)
+    atomic.write_atomically(files[-1], lambda part: part.write_text(text, encoding="utf-8"))
+    return files
 
 
-def _whole(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.DataFrame:
-    """The leaderboard's rows with how far each was checked and what making it took, the columns MADE."""
-    from dextron_bench.leaderboard.page import rows as page_rows
+def _with_origin(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    """The leaderboard's rows with the columns ORIGIN: how far each was checked, and what making it took."""
+    from dextron_bench.leaderboard.page.rows import QUOTED, entries
 
-    told = [each for each in page_rows.entries(rows, results) if each.tier != page_rows.QUOTED]
-    return rows.assign(**{name: [getattr(each, name) for each in told] for name in MADE})
+    own_entries = [entry for entry in entries(rows, results) if entry.tier != QUOTED]
+    return rows.assign(**{name: [getattr(entry, name) for entry in own_entries] for name in ORIGIN})
 
 
 def learning_curves(runs: Path, cloned: bool = False) -> dict[tuple[str, str], Curves]:
-    """The learning curves of runs that live in the world, by method and source of reaches; raises DamagedFile.
+    """The learning curves of runs that trained in the world, by method and source of reaches; raises DamagedFile.
 
-    What has no frames has no place on their axis: it is `cloned` from demonstrations.
+    With `cloned`, the curves of methods that learn from demonstrations alone: they have no frames.
     """
-    found: dict[tuple[str, str], Curves] = defaultdict(dict)
-    for file in sorted(runs.glob(f"*/*/seed*/{CURVE}")):
-        result = result_files.read_result(file.with_name(result_files.RESULT))
-        points = pd.DataFrame(atomic.read_json(file)["points"])
+    curves: dict[tuple[str, str], Curves] = defaultdict(dict)
+    for run in run_folders(runs):
+        if not run.curve.exists():
+            continue
+        result = result_files.read_result(run.result)
+        points = pd.DataFrame(atomic.read_json(run.curve)["points"])
         if (result["training"]["frames"] is None) == cloned:
-            found[result["method"], result["reaches"]][result["seed"]] = points
-    return found
+            curves[result["method"], result["reaches"]][result["seed"]] = points
+    return curves

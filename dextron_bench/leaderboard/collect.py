@@ -8,69 +8,74 @@ from typing import Any
 
 from dextron_bench.methods import registry, weights
 from dextron_bench.methods.learners import Learner
-from dextron_bench.runs import result_files, run_files
+from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import atomic
-from dextron_bench.training.jobs import CURVE
+from dextron_bench.storage.run_folder import RunFolder
 
-RESULTS = "results"  # In the leaderboard's folder: a folder of runs less their large files.
+RESULTS = "results"  # In the leaderboard's folder: a folder of runs without their large files.
 
 
 class NothingToPublish(LookupError):
-    """A folder of runs none of which is finished."""
+    """A folder of runs without a finished one."""
 
 
-def take(runs: Path, into: Path) -> list[Path]:
+def take(runs: Path, board: Path) -> list[Path]:
     """Copies results and curves of finished runs into the leaderboard's folder, and weights beside their methods.
 
-    A run is finished when its result holds all rows of all splits that rank methods. Returns the folders of results
+    A run is finished if its result holds all rows of all splits that rank methods. Returns the folders of results
     that were written; raises NothingToPublish, DamagedFile, UnknownMethod, BadSettings.
     """
     taken = []
-    for file in sorted(runs.glob(f"*/*/seed*/{result_files.RESULT}")):
-        result = result_files.read_result(file)
-        if not _finished(result):
+    for run in result_files.finished(runs):
+        result = result_files.read_result(run.result)
+        if not _is_complete(result):
             continue
-        place = into / RESULTS / file.parent.relative_to(runs)
-        known = place / result_files.RESULT
-        atomic.write_json(known, _checked(result, result_files.read_result(known)) if known.exists() else result)
-        if (found := file.with_name(CURVE)).exists():
-            _copy(found, place / CURVE)
-        _ship(file.parent, result)
-        taken.append(place)
+        copy = RunFolder(board / RESULTS / run.path.relative_to(runs))
+        before = result_files.read_result(copy.result) if copy.result.exists() else {}
+        atomic.write_json(copy.result, _with_tier(result, before))
+        if run.curve.exists():
+            _copy(run.curve, copy.curve)
+        _ship_weights(run, result)
+        taken.append(copy.path)
     if not taken:
         raise NothingToPublish(f"no run in {runs} holds all splits that rank methods; `dextron-bench run` makes some")
     return taken
 
 
-def _finished(result: dict[str, Any]) -> bool:
-    wanted = [load_split(result["reaches"], name) for name in ranking_splits(result["reaches"])]
-    have = {name: (found["digest"], len(found["scores"])) for name, found in result["splits"].items()}
-    return all(have.get(split.name) == (split.digest, len(split.cases)) for split in wanted)
+def _is_complete(result: dict[str, Any]) -> bool:
+    """True if a result holds all rows of all splits that rank methods, in their present versions."""
+    splits = [load_split(result["reaches"], name) for name in ranking_splits(result["reaches"])]
+    scored = {name: (split["digest"], len(split["scores"])) for name, split in result["splits"].items()}
+    return all(scored.get(split.name) == (split.digest, len(split.cases)) for split in splits)
 
 
-def _checked(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
-    """A result with what verification noted in the one before it, where both say the same of every episode."""
-    told = [{name: split["scores"] for name, split in each["splits"].items()} for each in (result, before)]
-    hashes = [(each.get("training") or {}).get("sha256") for each in (result, before)]
-    if told[0] != told[1] or hashes[0] != hashes[1] or "tier" not in before:
+def _with_tier(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+    """A result with the tier and hashes of actions of the one that it replaces, if both have the same scores."""
+    if "tier" not in before or _scores(result) != _scores(before):
         return result
-    noted = {name: before["splits"][name].get("actions") for name in result["splits"]}
-    parts = {
-        name: split | ({"actions": noted[name]} if noted[name] else {}) for name, split in result["splits"].items()
+    hashes = {name: before["splits"][name].get("actions") for name in result["splits"]}
+    splits = {
+        name: split | ({"actions": hashes[name]} if hashes[name] else {}) for name, split in result["splits"].items()
     }
-    return {**result, "splits": parts, "tier": before["tier"]}
+    return {**result, "splits": splits, "tier": before["tier"]}
 
 
-def _ship(folder: Path, result: dict[str, Any]) -> None:
-    """Puts an installed learner's weights where `eval` finds them; those of a file's stay with whose they are."""
-    config = atomic.read_json(folder / run_files.CONFIG)
+def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]:
+    """The scores of every split, and the hash of the weights that reached them."""
+    scores = {name: split["scores"] for name, split in result["splits"].items()}
+    return scores, (result.get("training") or {}).get("sha256")
+
+
+def _ship_weights(run: RunFolder, result: dict[str, Any]) -> None:
+    """Copies an installed learner's weights to where `eval` finds them; weights of a method in a file stay there."""
+    config = atomic.read_json(run.config)
     if config["code"]["sha256"]:
         return
     method = registry.create(config["code"]["class"], config["settings"])
     if isinstance(method, Learner):  # A method that takes the policy of another has no weights of its own.
-        _copy(folder / weights.FILE, weights.place(method, result["reaches"]) / f"seed{result['seed']}.safetensors")
+        _copy(run.weights, weights.shipped_folder(method, result["reaches"]) / f"seed{result['seed']}.safetensors")
 
 
-def _copy(file: Path, place: Path) -> None:
-    atomic.write_atomically(place, lambda part: shutil.copyfile(file, part))
+def _copy(file: Path, copy: Path) -> None:
+    atomic.write_atomically(copy, lambda part: shutil.copyfile(file, part))

@@ -1,7 +1,7 @@
-"""Reaches: recorded hand motions, and how one becomes the path of an episode.
+"""Reaches, which are recorded hand motions, and the path of an episode that is computed from a reach.
 
-A path is what the simulator follows: the pose of the palm's carrier at every control step. It is made
-from a reach by cleaning, B-spline and squad resampling, duration scaling and centring (paper, II.B).
+A path has the pose of the palm's carrier at every control step, and the simulator follows it. A reach is cleaned,
+resampled by B-splines and squad, scaled in duration and centred on the bottle (paper, II.B).
 """
 
 from __future__ import annotations
@@ -13,29 +13,29 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from dextron_bench.reaches import rotation
+from dextron_bench.reaches.timing import CONTROL_STEP
 
-CONTROL_STEP = 0.02  # [s] the interval between two actions, and between two poses of a path.
 TIME_SCALE = 2.5  # New duration = TIME_SCALE x old + TIME_SHIFT + TIME_SPREAD x noise (table I).
 TIME_SHIFT = 0.5  # [s]
 TIME_SPREAD = 0.8  # [s]
-SETTLE = 0.2  # [s] after `reached` over which the grasping pose is averaged.
+SETTLE = 0.2  # [s] interval after `reached` over which the grasping pose is averaged.
 PALM_AHEAD = np.array([0.0, 0.015, 0.0])  # [m] palm origin in the carrier's frame.
 PALM_CENTRE = np.array([0.0, 0.09, 0.03])  # [m] palm centre in the palm's frame.
-MIN_GAP = 0.002  # [s] samples closer than this are one sample, sent twice.
+MIN_GAP = 0.002  # [s] a sample that follows another sooner than this is the same sample, sent twice.
 DECIMALS = 9  # Poses are rounded to a nanometre, so that every processor follows the same path.
 
 
 class ReachError(ValueError):
-    """A reach that cannot be used; the message names it and says what is wrong."""
+    """A reach cannot be used; the message names the reach and the reason."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """One hand trajectory in the table's frame, z = 0 on the table.
+    """One hand trajectory in the table's frame, with z = 0 on the table.
 
-    times [s] (n,) from 0 and rising; positions [m] (n, 3) and unit quaternions wxyz (n, 4) of the palm's
-    carrier; `reached` [s], when the hand arrives at the bottle; `ring` 0 (near) to 3 (far) and `angle`
-    0 (-x side) to 3 (-y side), the start region.
+    `times` [s] (n,) start at 0 and rise. `positions` [m] (n, 3) and `quaternions` (n, 4), unit wxyz, are the poses of
+    the palm's carrier. `reached` [s] is the time at which the hand arrives at the bottle. `ring`, 0 (near) to 3 (far),
+    and `angle`, 0 (-x side) to 3 (-y side), are the start region.
     """
 
     name: str
@@ -54,13 +54,13 @@ class Reach:
 
     @cached_property
     def curve(self) -> Curve:
-        """The smooth motion through the samples."""
+        """The smooth motion that passes through the samples."""
         return Curve.through(self.times, self.positions, self.quaternions)
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A smooth motion through timed poses: cubic B-spline in position, squad in orientation."""
+    """A smooth motion through timed poses: a cubic B-spline in position, squad in orientation."""
 
     times: np.ndarray
     spline: BSpline
@@ -92,9 +92,10 @@ class Path:
 def clean(
     times: np.ndarray, positions: np.ndarray, quaternions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Drops repeated samples, starts the clock at 0, makes quaternions unit and continuous in sign.
+    """Drops repeated samples, starts the clock at 0, and makes quaternions unit and continuous in sign.
 
-    Shapes as in `Reach`. A sample repeats when it comes within MIN_GAP of the one before or has its pose.
+    Shapes are as in `Reach`. A sample is repeated if it comes within MIN_GAP of the last one kept, or
+    has the same pose.
     """
     keep = [0]
     for i in range(1, len(times)):
@@ -107,31 +108,31 @@ def clean(
 
 
 def scaled_duration(duration: np.ndarray | float, noise: np.ndarray | float) -> np.ndarray | float:
-    """Duration [s] of an episode's reach from the recorded one [s] and standard normal noise (table I)."""
+    """Duration [s] of a reach in an episode, from its recorded duration [s] and standard normal noise (table I)."""
     return TIME_SCALE * duration + TIME_SHIFT + TIME_SPREAD * noise
 
 
 def palm_centre(positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-    """Palm centre [m] (n, 3) in the world for carrier poses (n, 3) and (n, 4)."""
+    """Palm centres [m] (n, 3) in the world frame, for carrier positions [m] (n, 3) and quaternions (n, 4)."""
     return positions + rotation.rotate(quaternions, PALM_AHEAD + PALM_CENTRE)
 
 
 def path(reach: Reach, offset_x: float, offset_y: float, duration_noise: float) -> Path:
-    """The path of one setting: resampled, scaled in time, centred on the bottle, shifted by the offset [m].
+    """The path of one setting: resampled, scaled in time, centred on the bottle, and shifted by the offsets [m].
 
-    Raises ReachError where the noise would make the reach faster than it was recorded.
+    Raises ReachError if the noise makes the reach faster than the recording.
     """
     duration = float(scaled_duration(reach.duration, duration_noise))
     if duration < reach.duration:
         raise ReachError(
             f"duration noise {duration_noise:.3f} makes reach {reach.name} last {duration:.2f} s, "
-            f"less than the recorded {reach.duration:.2f} s; use a larger one"
+            f"less than the recorded {reach.duration:.2f} s; use a larger noise"
         )
     scale = duration / reach.duration
     steps = np.arange(int(np.floor(duration / CONTROL_STEP + 1e-9)) + 1) * CONTROL_STEP
     positions, quaternions = reach.curve(np.minimum(steps / scale, reach.duration))
-    arrived = reach.reached * scale
-    settled = (steps >= arrived) & (steps < arrived + SETTLE)
+    arrival = reach.reached * scale
+    settled = (steps >= arrival) & (steps < arrival + SETTLE)
     centre = palm_centre(positions[settled].mean(axis=0), rotation.mean(quaternions[settled]))
     positions[:, 0] += offset_x - centre[0]
     positions[:, 1] += offset_y - centre[1]

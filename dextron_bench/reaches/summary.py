@@ -1,20 +1,20 @@
-"""What a source of reaches holds: how many, how long, how far and how fast, by subject and start region."""
+"""Statistics of a source: number, duration, length and speed of its reaches, by subject and start region."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 
-from dextron_bench.reaches.reach import CONTROL_STEP
 from dextron_bench.reaches.setting import ReachSource, Setting, Source
+from dextron_bench.reaches.timing import CONTROL_STEP
 
 MEASURES = ("duration", "length", "speed")
 
 
-def survey(source: Source) -> pd.DataFrame:
-    """One row a reach: name, subject, ring, angle, duration [s], path length [m] and mean speed [m/s] of the carrier.
+def reach_table(source: Source) -> pd.DataFrame:
+    """A table of one row for each reach: name, subject, ring, angle, duration [s], length [m] and mean speed [m/s].
 
-    Recorded and synthetic reaches are measured as they are, before an episode stretches their time.
+    The palm's carrier is measured. Recorded and synthetic reaches are measured before an episode scales their duration.
     """
     rows = []
     for name in source.names:
@@ -24,14 +24,14 @@ def survey(source: Source) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["name", "subject", "ring", "angle", *MEASURES])
 
 
-def means(reaches: pd.DataFrame, by: list[str]) -> pd.DataFrame:
-    """Number of reaches and mean of each measure for each group of a survey, sorted by group."""
-    wanted = {"reaches": ("name", "size")} | {measure: (measure, "mean") for measure in MEASURES}
-    return reaches.groupby(by, as_index=False, sort=True).agg(**wanted)
+def group_means(reaches: pd.DataFrame, by: list[str]) -> pd.DataFrame:
+    """Number of reaches and mean of each measure, for each group of a `reach_table`, sorted by group."""
+    columns = {"reaches": ("name", "size")} | {measure: (measure, "mean") for measure in MEASURES}
+    return reaches.groupby(by, as_index=False, sort=True).agg(**columns)
 
 
 def _motion(source: Source, name: str) -> tuple[float, float]:
-    """Duration [s] and path length [m] of a reach."""
+    """Duration [s] and length [m] of a reach."""
     if isinstance(source, ReachSource):
         reach = source.reach(name)
         return reach.duration, path_length(reach.positions)
@@ -40,5 +40,5 @@ def _motion(source: Source, name: str) -> tuple[float, float]:
 
 
 def path_length(positions: np.ndarray) -> float:
-    """Length [m] of the polygon through positions [m] (n, 3)."""
+    """Length [m] of the polyline through positions [m] (n, 3)."""
     return float(np.sqrt((np.diff(positions, axis=0) ** 2).sum(axis=1)).sum())

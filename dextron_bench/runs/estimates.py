@@ -1,4 +1,4 @@
-"""What a run would do, and about how long it would take."""
+"""What is left to do of runs, and about how long it takes."""
 
 from __future__ import annotations
 
@@ -13,77 +13,84 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches import sources
 from dextron_bench.runs import run_files
-from dextron_bench.runs.plans import Plan
+from dextron_bench.runs.plans import Run
 from dextron_bench.splits.loading import load_split
-from dextron_bench.training import jobs, loop, timing
+from dextron_bench.storage import folder_config
+from dextron_bench.training import loop, timing
 from dextron_bench.training.checkpoints import Checkpoints
-from dextron_bench.training.learning_curve import CURVE
+from dextron_bench.training.jobs import TrainingJob
+from dextron_bench.training.learning_curve import POINT_ROWS
 
-PLAYED = 32  # Episodes from which the time of others is foretold.
+TIMED = 32  # Episodes that are played to measure the time of one.
 
 
 def estimate(
-    groups: Sequence[Sequence[Plan]], runs: Path, threads: int = 0, device: str = "cpu"
+    groups: Sequence[Sequence[Run]], runs: Path, threads: int = 0, device: str = "cpu"
 ) -> list[dict[str, Any]]:
-    """A row for each training and each evaluation that is not done, in their order; nothing of a run is written.
+    """A row for each training and each evaluation with work left, in their order; writes no files of a run.
 
-    `left` is in words, `seconds` an estimate: of epochs from earlier ones, else from a timing_run; of episodes from
-    some that their experts play. Raises what `run.learn` does.
+    Runs of a group differ only in their seeds. `left` is in words; `seconds` is an estimate: for epochs from earlier
+    ones, else from a timing run; for episodes from some that experts play. Raises the errors of `execution.train`.
     """
-    found: dict[str, dict[str, Any]] = {}
-    for plans in groups:
-        for plan in plans:
-            run_files.check(plan.folder(runs), plan.config())
-        if course := plans[0].course(runs, threads, device):
-            for group in course.groups([plan.seed for plan in plans]):
-                folder = course.folder(group)
-                if str(folder) not in found:
-                    found[str(folder)] = _training(course, group, folder)
-        if left := sum(_episodes(plan, runs) for plan in plans):
-            found[str(plans[0].folder(runs))] = {
-                "what": "evaluate",
-                "method": plans[0].label,
-                "reaches": plans[0].source,
-                "seeds": [plan.seed for plan in plans],
-                "left": f"{left} episodes",
-                "seconds": left * seconds_per_episode(plans[0].source, threads),
-            }
-    return list(found.values())
+    rows: dict[str, dict[str, Any]] = {}
+    for group in groups:
+        for run in group:
+            folder_config.check(run.folder(runs).path, run.config())
+        if job := group[0].training_job(runs, threads, device):
+            for seeds in job.groups([run.seed for run in group]):
+                folder = job.training_folder(seeds)
+                if str(folder) not in rows:
+                    rows[str(folder)] = _training(job, seeds, folder)
+        if episodes := sum(_missing_episodes(run, runs) for run in group):
+            rows[str(group[0].folder(runs).path)] = _evaluation(group, episodes, threads)
+    return list(rows.values())
 
 
 @cache
 def seconds_per_episode(reaches: str, threads: int) -> float:
-    """About how long an episode takes [s] when many are played at once, on a source of reaches."""
-    cases = load_split(reaches, "val").cases[:PLAYED]
-    source = sources.open_source(reaches)
-    began = time.perf_counter()
+    """Duration of an episode [s] on a source of reaches when many are played at once."""
+    cases, source = load_split(reaches, "val").cases[:TIMED], sources.open_source(reaches)
+    start = time.perf_counter()
     for _ in rollout(ExpertAgent(), source, cases, threads=threads):
         pass
-    return (time.perf_counter() - began) / len(cases)
+    return (time.perf_counter() - start) / len(cases)
 
 
-def _training(course: jobs.TrainingJob, group: tuple[int, ...], folder: Path) -> dict[str, Any]:
-    learner = course.learner
-    progress = Checkpoints(folder, group).progress()
+def _training(job: TrainingJob, seeds: tuple[int, ...], folder: Path) -> dict[str, Any]:
+    """The row of a training."""
+    learner = job.learner
+    progress = Checkpoints(folder, seeds).progress()
     left = learner.epochs - (progress.epoch if progress else 0)
     seconds = timing.seconds_left(folder, left, learner.period)
     if seconds is None:
-        points = min(CURVE, len(load_split(course.reaches, "val").cases)) * math.ceil(left / learner.period)
-        seconds = left * loop.measure(learner, course.track(), group)
-        seconds += points * len(group) * seconds_per_episode(course.reaches, course.threads)
+        rows = min(POINT_ROWS, len(load_split(job.reaches, "val").cases)) * math.ceil(left / learner.period)
+        seconds = left * loop.seconds_per_epoch(learner, job.track(), seeds)
+        seconds += rows * len(seeds) * seconds_per_episode(job.reaches, job.threads)
     return {
         "what": "train",
         "method": learner.label,
-        "reaches": course.reaches,
-        "seeds": list(group),
+        "reaches": job.reaches,
+        "seeds": list(seeds),
         "left": f"{left} of {learner.epochs} epochs",
         "seconds": seconds,
     }
 
 
-def _episodes(plan: Plan, runs: Path) -> int:
-    """Episodes that are not in store."""
-    wanted = [load_split(plan.source, name) for name in plan.splits]
-    done = run_files.stored(plan.folder(runs), wanted)
-    counts = done["split"].value_counts().to_dict() if len(done) else {}
-    return sum(len(split.cases) - counts.get(split.name, 0) for split in wanted)
+def _evaluation(group: Sequence[Run], episodes: int, threads: int) -> dict[str, Any]:
+    """The row of an evaluation."""
+    return {
+        "what": "evaluate",
+        "method": group[0].label,
+        "reaches": group[0].source,
+        "seeds": [run.seed for run in group],
+        "left": f"{episodes} episodes",
+        "seconds": episodes * seconds_per_episode(group[0].source, threads),
+    }
+
+
+def _missing_episodes(run: Run, runs: Path) -> int:
+    """Number of episodes that the run's folder lacks."""
+    splits = [load_split(run.source, name) for name in run.splits]
+    table = run_files.stored_episodes(run.folder(runs), splits)
+    counts = table["split"].value_counts().to_dict() if len(table) else {}
+    return sum(len(split.cases) - counts.get(split.name, 0) for split in splits)

@@ -1,4 +1,4 @@
-"""Runs: one method, one seed, one source of reaches, trained where it has to be, and evaluated on splits."""
+"""Executes runs: trains if the method learns, evaluates on splits, records episodes, writes the result."""
 
 from __future__ import annotations
 
@@ -14,116 +14,112 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods import weights
 from dextron_bench.methods.agents import Agent, Privileged, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
-from dextron_bench.methods.registry import Entrant
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import recording_files, result_files, run_files
-from dextron_bench.runs.plans import Plan
+from dextron_bench.runs.plans import Run, no_weights
 from dextron_bench.splits.loading import Split, load_split
-from dextron_bench.training import jobs, loop
+from dextron_bench.storage import folder_config
+from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.run_folder import RunFolder
 
-Report = Callable[[int, int], None]  # Told (done, all).
 Played = Iterator[tuple[int, Episode]]  # Rows and their episodes, as these end.
 
 
-def quiet(done: int, total: int) -> None:
-    """Reports nothing."""
-
-
-def learn(
-    plans: Sequence[Plan], runs: Path, threads: int = 0, device: str = "cpu", report: loop.Report = loop.quiet
+def train(
+    group: Sequence[Run], runs: Path, threads: int = 0, device: str = "cpu", report: Progress = no_progress
 ) -> None:
-    """Trains what the plans, equal but for their seeds, need and have not: all seeds together.
+    """Trains what runs need that differ only in their seeds, all seeds together; trained seeds are left as they are.
 
-    `report` is told (epochs done, epochs in all, how it goes). Raises what `execute` does, Diverged, Busy, NoDevice.
+    `report` receives epochs. Raises the errors of `execute`, and Diverged, Busy, NoDevice.
     """
-    for plan in plans:
-        run_files.check(plan.folder(runs), plan.config())
-    if course := plans[0].course(runs, threads, device):
-        course.run([plan.seed for plan in plans], report)
+    for run in group:
+        folder_config.check(run.folder(runs).path, run.config())
+    if job := group[0].training_job(runs, threads, device):
+        job.run([run.seed for run in group], report)
 
 
-def execute(plan: Plan, runs: Path, threads: int = 0, report: Report = quiet) -> Path:
-    """Evaluates what the folder does not hold yet; returns the folder, with its `result.json`.
+def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progress) -> Path:
+    """Trains and evaluates what the run's folder does not hold yet; returns the folder, with its `result.json`.
 
-    `report` is told (episodes done, episodes in all) of each split. Raises FolderMismatch, DamagedFile,
-    UnknownMethod, UnknownSplit, MissingData, AgentError.
+    `report` receives the episodes of each split. Raises FolderMismatch, DamagedFile, UnknownSplit, MissingData,
+    AgentError, MissingWeights.
     """
-    method = plan.make()
-    folder = plan.folder(runs)
-    wanted = [load_split(plan.source, name) for name in plan.splits]
-    source = sources.open_source(plan.source)
-    learn([plan], runs, threads)
-    given = _given(method, plan, runs)
-    access: dict[str, Any] = {}
-    if isinstance(agent(method, plan.seed, given), Privileged):  # Raises before there is a folder.
-        access = {"privileged": "each setting's expert"}
-    run_files.claim(folder, plan.config())
-    trained = run_files.adopt(given, folder) if given else None
-    about = {"method": plan.label, "reaches": plan.source, "seed": plan.seed}
+    folder = run.folder(runs)
+    splits = [load_split(run.source, name) for name in run.splits]
+    source = sources.open_source(run.source)
+    train([run], runs, threads)
+    given = _weights_file(run, runs)
+    privileged = isinstance(agent(run, given), Privileged)  # Raises before there is a folder.
+    folder_config.write_or_check(folder.path, run.config())
+    own = run_files.copy_weights(given, folder) if given else None
 
     def play(split: Split) -> Played:
-        return rollout(agent(method, plan.seed, trained), source, split.cases, threads=threads)
+        return rollout(agent(run, own), source, split.cases, threads=threads)
 
-    episodes = evaluate(folder, source, wanted, play, plan.record, about, report)
-    told = {"training": weights.about(trained) | _cost(plan, runs)} if trained else {}
-    seconds = course.seconds(plan.seed) if (course := plan.course(runs)) else None
-    result_files.conclude(folder, episodes, about | told | access, seconds)
-    return folder
+    episodes = evaluate(folder, source, splits, play, run.plan.record, run.about, report)
+    about = run.about | _training_facts(run, own) | ({"privileged": "each setting's expert"} if privileged else {})
+    job = run.training_job(runs)
+    result_files.write_result(folder, episodes, about, job.seconds(run.seed) if job else None)
+    return folder.path
 
 
-def _cost(plan: Plan, runs: Path) -> dict[str, Any]:
-    """What a run's training took: demonstrations, where its method tells how many."""
-    course = plan.course(runs)
-    if not course:
-        return {}
-    count = getattr(course.learner, "demonstrations", lambda episodes: None)
-    return {"demonstrations": count(len(load_split(course.reaches, "train").cases))}
+def agent(run: Run, file: Path | None) -> Agent:
+    """The agent of a run, with the weights of a file if its method learns; raises AgentError, BadWeights."""
+    if run.learner is not None:
+        assert file is not None
+        return weights.load_agent(run.learner, file)
+    assert not isinstance(run.method, Learner | PolicyTransfer)
+    with as_agent_error(f"agent({run.seed}) of method {run.method.name!r}"):
+        return run.method.agent(run.seed)
 
 
 def evaluate(
-    folder: Path,
+    folder: RunFolder,
     source: Source,
-    wanted: Sequence[Split],
+    splits: Sequence[Split],
     play: Callable[[Split], Played],
     record: int,
     about: dict[str, Any],
-    report: Report = quiet,
+    report: Progress = no_progress,
 ) -> pd.DataFrame:
-    """The table of episodes of a run's folder, those that it lacks played and added split by split.
+    """The table of episodes of a run; plays the splits that the folder lacks and stores the table after each.
 
-    `play` gives (row, episode) of a split's rows as they end; the first `record` are recorded, told of by `about`.
+    `play` yields (row, episode) of a split as episodes end. The first `record` rows are recorded; `about` goes into
+    their properties.
     """
-    episodes = run_files.stored(folder, wanted)
-    for split in wanted:
-        done = episodes[episodes["split"] == split.name] if len(episodes) else episodes
-        if len(done) == len(split.cases) and not recording_files.unrecorded(folder, done, record):
+    table = run_files.stored_episodes(folder, splits)
+    for split in splits:
+        stored = table[table["split"] == split.name] if len(table) else table
+        if len(stored) == len(split.cases) and not recording_files.any_missing(folder, stored, record):
             continue
         rows: dict[int, dict[str, Any]] = {}
-        for index, episode in play(split):
-            rows[index] = episode_table.row(split, index, episode)
-            if index < record and len(episode.actions):
-                recording_files.record(folder, source, split, index, episode, about)
+        for row, episode in play(split):
+            rows[row] = episode_table.row(split, row, episode)
+            if row < record and len(episode.actions):
+                recording_files.record(folder, source, split, row, episode, about)
             report(len(rows), len(split.cases))
-        kept = [episodes[episodes["split"] != split.name]] if len(episodes) else []
-        episodes = pd.concat([*kept, pd.DataFrame([rows[index] for index in sorted(rows)])], ignore_index=True)
-        run_files.store(folder, episodes)
-    return episodes
+        others = [table[table["split"] != split.name]] if len(table) else []
+        table = pd.concat([*others, pd.DataFrame([rows[row] for row in sorted(rows)])], ignore_index=True)
+        run_files.store_episodes(folder, table)
+    return table
 
 
-def _given(method: Entrant, plan: Plan, runs: Path) -> Path | None:
-    """The file of weights that a run acts with; None for a method that has none."""
-    if course := plan.course(runs):
-        return jobs.place(runs, course.learner, course.reaches, plan.seed) / weights.FILE
-    if plan.weights and not isinstance(method, PolicyTransfer | Learner):
-        raise weights.MissingWeights(f"method {method.name!r} has no weights: `dextron-bench run` evaluates it")
-    return plan.weights
+def _weights_file(run: Run, runs: Path) -> Path | None:
+    """The file of weights that a run acts with; None for a method that does not learn."""
+    if job := run.training_job(runs):
+        return job.run_folder(run.seed).weights
+    if run.plan.weights and run.learner is None:
+        raise no_weights(run)
+    return run.plan.weights
 
 
-def agent(method: Entrant, seed: int, trained: Path | None) -> Agent:
-    """A method's agent for a seed, with the weights of a file where it learns; raises AgentError, BadWeights."""
-    if isinstance(method, PolicyTransfer | Learner):
-        assert trained is not None
-        return weights.agent(method.source_policy if isinstance(method, PolicyTransfer) else method, trained)
-    with as_agent_error(f"agent({seed}) of method {method.name!r}"):
-        return method.agent(seed)
+def _training_facts(run: Run, file: Path | None) -> dict[str, Any]:
+    """What a result says of the training: the facts in the file of weights, and the number of demonstrations."""
+    if file is None:
+        return {}
+    facts = weights.metadata(file)
+    if run.learner is None or run.plan.weights:
+        return {"training": facts}
+    count = getattr(run.learner, "demonstrations", lambda episodes: None)
+    return {"training": facts | {"demonstrations": count(len(load_split(run.training_source, "train").cases))}}

@@ -1,4 +1,4 @@
-"""What to run: a plan for a method, a source of reaches and a seed."""
+"""What to run: a plan for a method, a source of reaches and a seed, and the run that it resolves to."""
 
 from __future__ import annotations
 
@@ -8,70 +8,116 @@ from pathlib import Path
 from typing import Any
 
 from dextron_bench.methods import registry
-from dextron_bench.methods import weights as methods_weights
+from dextron_bench.methods import weights as method_weights
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.registry import Entrant
-from dextron_bench.training import jobs
+from dextron_bench.splits.loading import ranking_splits
+from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.training.jobs import TrainingJob
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What to run: a method on a source's splits with one seed; the first `record` episodes of each are recorded.
+    """What a user asks for: a method on the splits of a source with one seed.
 
-    `settings` are the method's own. Where `weights` is a file, the method acts with them and trains nothing.
+    The first `record` episodes of each split are recorded. `settings` are the method's own. If `weights` is a file,
+    the method acts with these weights and trains nothing. No `splits` means all that rank methods.
     """
 
     method: str
     reaches: str
-    splits: tuple[str, ...]
-    seed: int
+    splits: tuple[str, ...] = ()
+    seed: int = 0
     record: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
     weights: Path | None = None
 
-    def make(self) -> Entrant:
-        """The method for its source of reaches; raises UnknownMethod, BadSettings, AgentError."""
-        return registry.create(self.method, self.settings, self.reaches)
 
-    def folder(self, runs: Path) -> Path:
-        """Where the run lives."""
-        return runs / self.label / self.source / f"seed{self.seed}"
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A plan resolved once: the method itself, its label, and the source of reaches that it is evaluated on.
 
-    def course(self, runs: Path, threads: int = 0, device: str = "cpu") -> jobs.TrainingJob | None:
-        """The training that its method or its source_policy needs; None where nothing is trained."""
-        method = self.make()
-        learner = method.source_policy if isinstance(method, PolicyTransfer) else method
-        if not isinstance(learner, Learner) or self.weights:
-            return None
-        return jobs.TrainingJob(learner, registry.run_source(learner, self.reaches), runs, threads, device)
+    `learner` trains the weights that the method acts with: the method itself, the source policy of a transfer, or None.
+    """
+
+    plan: Plan
+    method: Entrant
+    learner: Learner | None
+    label: str
+    source: str
 
     @property
-    def source(self) -> str:
-        """The source of reaches that the run is on."""
-        return registry.run_source(self.make(), self.reaches)
+    def splits(self) -> tuple[str, ...]:
+        """Names of the splits to evaluate on; raises UnknownSplit if the source has none that rank methods."""
+        return self.plan.splits or ranking_splits(self.source)
 
     @property
-    def label(self) -> str:
-        """What the run's row is called."""
-        return registry.label(self.make())
+    def seed(self) -> int:
+        """The seed of the agent."""
+        return self.plan.seed
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Method, source of reaches and seed, as results and recordings say them."""
+        return {"method": self.label, "reaches": self.source, "seed": self.seed}
+
+    def with_seed(self, seed: int) -> Run:
+        """The same run with another seed."""
+        return replace(self, plan=replace(self.plan, seed=seed))
+
+    def with_weights(self, seed: int, weights: Path) -> Run:
+        """The same run with another seed, which acts with the weights of a file."""
+        return replace(self, plan=replace(self.plan, seed=seed, weights=weights))
+
+    def folder(self, runs: Path) -> RunFolder:
+        """The run's folder."""
+        return RunFolder.of(runs, self.label, self.source, self.seed)
 
     def config(self) -> dict[str, Any]:
-        """What the run depends on."""
-        return registry.config(self.make(), self.source, self.seed)
+        """What the run depends on; a folder belongs to one config."""
+        return registry.run_config(self.method, self.source, self.seed)
+
+    def training_job(self, runs: Path, threads: int = 0, device: str = "cpu") -> TrainingJob | None:
+        """The training that the run needs; None if the plan names weights or nothing is trained."""
+        if self.learner is None or self.plan.weights:
+            return None
+        return TrainingJob(self.learner, self.training_source, runs, threads, device)
+
+    @property
+    def training_source(self) -> str:
+        """The source of reaches that the learner is trained on."""
+        return registry.run_source(self.learner or self.method, self.plan.reaches)
 
 
-def shipped(plan: Plan, seeds: Sequence[int]) -> list[Plan]:
-    """The plan with the weights that ship, for these seeds or, where there are none, for all; raises MissingWeights."""
-    method = plan.make()
-    learner = method.source_policy if isinstance(method, PolicyTransfer) else method
-    if not isinstance(learner, Learner):
-        raise methods_weights.MissingWeights(f"method {method.name!r} has no weights: `dextron-bench run` evaluates it")
-    found = methods_weights.shipped(learner, registry.run_source(learner, plan.reaches))
-    if lost := [seed for seed in seeds or (0,) if seed not in found and (seeds or not found)]:
-        others = methods_weights.labels(learner, registry.run_source(learner, plan.reaches))
-        raise methods_weights.MissingWeights(
-            f"no weights of {plan.label!r} on {plan.reaches} reaches ship for seed {lost[0]}; train them with "
-            f"`dextron-bench run {registry.words(plan.method, plan.settings)} --reaches {plan.reaches} "
-            f"--seed {lost[0]}`" + (f", or take what ships: {', '.join(others)}" if others else "")
+def resolve(plan: Plan) -> Run:
+    """The run of a plan; raises UnknownMethod, BadSettings, AgentError."""
+    method = registry.create(plan.method, plan.settings, plan.reaches)
+    policy = method.source_policy if isinstance(method, PolicyTransfer) else method
+    learner = policy if isinstance(policy, Learner) else None
+    return Run(plan, method, learner, registry.label(method), registry.run_source(method, plan.reaches))
+
+
+def with_shipped_weights(run: Run, seeds: Sequence[int]) -> list[Run]:
+    """The run with the weights that ship, for these seeds; for all that ship if `seeds` is empty.
+
+    Raises MissingWeights.
+    """
+    if run.learner is None:
+        raise no_weights(run)
+    source = run.training_source
+    files = method_weights.shipped(run.learner, source)
+    if missing := [seed for seed in seeds or (0,) if seed not in files and (seeds or not files)]:
+        others = method_weights.shipped_labels(run.learner, source)
+        command = f"dextron-bench run {registry.as_flags(run.plan.method, run.plan.settings)}"
+        raise method_weights.MissingWeights(
+            f"no weights of {run.label!r} on {run.plan.reaches} reaches ship for seed {missing[0]}; train them with "
+            f"`{command} --reaches {run.plan.reaches} --seed {missing[0]}`"
+            + (f", or use weights that ship: {', '.join(others)}" if others else "")
         )
-    return [replace(plan, seed=seed, weights=found[seed]) for seed in seeds or found]
+    return [run.with_weights(seed, files[seed]) for seed in seeds or files]
+
+
+def no_weights(run: Run) -> method_weights.MissingWeights:
+    """The error for a method that is asked for its weights and has none."""
+    name = run.method.name
+    return method_weights.MissingWeights(f"method {name!r} has no weights: `dextron-bench run` evaluates it")

@@ -1,62 +1,56 @@
-"""The recordings of a run, and their manifest."""
+"""The recordings of a run, and the manifest of their hashes."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from dextron_bench.evaluation import predictions
 from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.experts.policies import Case
-from dextron_bench.reaches import setting
+from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic
+from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.success import network
 from dextron_bench.success.predict import predict
 from dextron_bench.world import model
 
-MANIFEST = "recordings.json"  # The SHA-256 of every recording.
 
+def any_missing(folder: RunFolder, table: pd.DataFrame, record: int) -> bool:
+    """True if the recording of one of the first `record` rows is missing.
 
-def unrecorded(folder: Path, done: pd.DataFrame, record: int) -> bool:
-    """Whether a recording is missing; an episode that failed before its first step has none."""
-    wanted = done[(done["row"] < record) & (done["length"] > 0)]
-    places = (recording_file(folder, split, row) for split, row in zip(wanted["split"], wanted["row"], strict=True))
-    return not all(place.exists() for place in places)
-
-
-def record(
-    folder: Path, source: setting.Source, split: Split, index: int, episode: Episode, about: dict[str, Any]
-) -> None:
-    """Writes an episode's recording: whose it is, in `about`, and what the success model that ships thinks of it.
-
-    The run's manifest then has the file's SHA-256.
+    An episode that failed before its first step has no recording.
     """
-    from dextron_bench import recording
+    rows = table[(table["row"] < record) & (table["length"] > 0)]
+    files = (folder.recording(split, row) for split, row in zip(rows["split"], rows["row"], strict=True))
+    return not all(file.exists() for file in files)
 
-    properties = {**about, "split": split.name, "split_digest": split.digest, "row": index}
+
+def record(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> None:
+    """Writes the recording of an episode, with what the shipped success model predicts, and its hash in the manifest.
+
+    `about` names method, source of reaches and seed.
+    """
+    from dextron_bench import recording  # Loads Rerun, which evaluation alone does not need.
+
+    properties = {**about, "split": split.name, "split_digest": split.digest, "row": row}
     properties["physics"] = model.mjcf_hash()
-    file, path = recording_file(folder, split.name, index), source.path(episode.setting)
-    sha256 = recording.write(file, episode, path, properties, _insight(source, split.cases[index], episode))
-    atomic.write_json(folder / MANIFEST, manifest(folder) | {file.name: sha256})
+    file, path = folder.recording(split.name, row), source.path(episode.setting)
+    sha256 = recording.write(file, episode, path, properties, _predictions(source, split.cases[row], episode))
+    atomic.write_json(folder.manifest, manifest(folder) | {file.name: sha256})
 
 
-def manifest(folder: Path) -> dict[str, str]:
-    """The SHA-256 of each of a run's recordings by the file's name; raises DamagedFile."""
-    return atomic.read_json(folder / MANIFEST) if (folder / MANIFEST).exists() else {}
+def manifest(folder: RunFolder) -> dict[str, str]:
+    """The SHA-256 of each recording of a run by the file's name; raises DamagedFile."""
+    return atomic.read_json(folder.manifest) if folder.manifest.exists() else {}
 
 
-def recording_file(folder: Path, split: str, index: int) -> Path:
-    """Where the recording of a split's row lies in a run's folder."""
-    return folder / "recordings" / f"{split}-{index:04d}.rrd"
-
-
-def _insight(source: setting.Source, case: Case, episode: Episode) -> predictions.StepPredictions | None:
-    """None where no success model ships for the source."""
+def _predictions(source: Source, case: Case, episode: Episode) -> StepPredictions | None:
+    """Predictions of the success model that ships for the source; None if none ships."""
     try:
-        judge = network.shipped(source.name)
+        success_model = network.shipped_model(source.name)
     except network.MissingModel:
         return None
-    return predict(judge, source, case, episode)
+    return predict(success_model, source, case, episode)

@@ -1,8 +1,8 @@
-"""Recordings after the fact: of episodes in the tables of runs, made from the actions that were taken."""
+"""Recordings made afterwards: episodes played again from the actions in their table."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,44 +14,47 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import from_frame
-from dextron_bench.runs import recording_files, run_files, selection
+from dextron_bench.runs import recording_files, selection
 from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import atomic
+from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
 
-Report = Callable[[int, int], None]  # Told (recordings made, all to make).
+MISSING = "missing"
 
 
 class Unplayable(ValueError):
-    """An episode that cannot be recorded after the fact; the message says why, and what to do."""
+    """An episode that cannot be recorded afterwards; the message says why, and what to do."""
 
 
-def restore(picked: pd.DataFrame, report: Report = lambda done, total: None) -> list[Path]:
-    """The recordings of picked episodes, in order; those that are missing, damaged or of another episode are made.
+def rerecord(table: pd.DataFrame, report: Progress = no_progress) -> list[Path]:
+    """The recordings of selected episodes, in order; makes recordings that are missing, damaged or of another episode.
 
     Raises Unplayable, UnwritableRecording, MissingData, UnknownSplit.
     """
-    rows = picked.to_dict("records")
-    files = [recording_files.recording_file(Path(row["folder"]), row["split"], row["row"]) for row in rows]
-    wrong = _wrong(files, rows)
-    missing = picked[[bool(why) for why in wrong]]
-    for row, why in zip(rows, wrong, strict=True):
-        _check_playable(row, why)
+    rows = table.to_dict("records")
+    files = [RunFolder(Path(row["folder"])).recording(row["split"], row["row"]) for row in rows]
+    faults = _faults(files, rows)
+    for row, fault in zip(rows, faults, strict=True):
+        if fault:
+            _check_playable(row, fault)
+    to_make = table[[bool(fault) for fault in faults]]
     done = 0
-    for _, group in missing.groupby(["folder", "split"], sort=False):
+    for _, group in to_make.groupby(["folder", "split"], sort=False):
         for _ in _record(group):
             done += 1
-            report(done, len(missing))
+            report(done, len(to_make))
     return files
 
 
-def _wrong(files: Sequence[Path], rows: Sequence[dict[Any, Any]]) -> list[str]:
-    """Why each file is not the recording of its row; nothing where it is."""
-    told = recording.summarise([file for file in files if file.exists()])
-    return [_why(next(told), row) if file.exists() else "missing" for file, row in zip(files, rows, strict=True)]
+def _faults(files: Sequence[Path], rows: Sequence[dict[Any, Any]]) -> list[str]:
+    """Why each file is not the recording of its row; empty if it is."""
+    summaries = recording.summarise([file for file in files if file.exists()])
+    return [_fault(next(summaries), row) if file.exists() else MISSING for file, row in zip(files, rows, strict=True)]
 
 
-def _why(summary: recording.Summary, row: dict[Any, Any]) -> str:
+def _fault(summary: recording.Summary, row: dict[Any, Any]) -> str:
     if summary.damage:
         return summary.damage
     expected = {"split_digest": row["digest"], "episode_return": row["score"], "steps": row["length"]}
@@ -59,42 +62,41 @@ def _why(summary: recording.Summary, row: dict[Any, Any]) -> str:
     return f"is of an episode with another {other[0].replace('_', ' ')}" if other else ""
 
 
-def _check_playable(row: dict[Any, Any], why: str) -> None:
-    """Raises Unplayable where a recording is wrong and nothing is left to make it from."""
-    folder = Path(row["folder"])
-    called, again = f"{row['split']} row {row['row']} of {folder}", "give the command that made the run again"
-    if not why:
-        return
+def _check_playable(row: dict[Any, Any], fault: str) -> None:
+    """Raises Unplayable if nothing is left to make a recording from."""
+    run = RunFolder(Path(row["folder"]))
+    name, advice = f"{row['split']} row {row['row']} of {run.path}", "run the command that made the run again"
     if not hasattr(row.get("actions"), "__len__"):
-        told = "has no recording" if why == "missing" else f"has a recording that {why}"
+        problem = "has no recording" if fault == MISSING else f"has a recording that {fault}"
         raise Unplayable(
-            f"{called} {told}, and its actions were not kept; remove {folder / run_files.EPISODES} and {again}: "
-            "episodes are played again, nothing is trained"
+            f"{name} {problem}, and its actions were not kept; remove {run.episodes} and {advice}: "
+            "it plays the episodes again and trains nothing"
         )
-    if atomic.read_json(folder / run_files.CONFIG).get("physics") != model.mjcf_hash():
-        raise Unplayable(f"{called} was played with other physics than this version's; remove {folder} and {again}")
+    if atomic.read_json(run.config).get("physics") != model.mjcf_hash():
+        raise Unplayable(f"{name} was played with other physics than this version's; remove {run.path} and {advice}")
     if load_split(row["reaches"], row["split"]).digest != row["digest"]:
-        raise Unplayable(f"{called} is of a version of the split that is no more; {again}")
+        raise Unplayable(f"{name} is of an older version of the split; {advice}")
 
 
-def _record(group: pd.DataFrame) -> Iterator[Path]:
-    """Plays the episodes of one run on one split again, and records them."""
+def _record(group: pd.DataFrame) -> Iterator[None]:
+    """Plays the episodes of one run on one split again, and records them; yields after each."""
     rows = group.to_dict("records")
-    folder, name = Path(rows[0]["folder"]), rows[0]["reaches"]
-    source, split, about = sources.open_source(name), load_split(name, rows[0]["split"]), selection.run_identity(folder)
+    run, reaches = RunFolder(Path(rows[0]["folder"])), rows[0]["reaches"]
+    source, split = sources.open_source(reaches), load_split(reaches, rows[0]["split"])
+    about = selection.run_identity(run)
     for place, episode in replay(source, from_frame(group), group["actions"].tolist()):
         row = rows[place]
-        recording_files.record(folder, source, split, row["row"], _same(row, episode), about)
-        yield recording_files.recording_file(folder, split.name, row["row"])
+        recording_files.record(run, source, split, row["row"], _as_recorded(row, episode), about)
+        yield
 
 
-def _same(row: dict[Any, Any], episode: Episode) -> Episode:
-    """The episode, with the failure that it had; raises Unplayable where it did not go as the row says."""
+def _as_recorded(row: dict[Any, Any], episode: Episode) -> Episode:
+    """The episode with the failure in its row; raises Unplayable if the replay differs from the row."""
     episode = replace(episode, failure=row["failure"]) if row["failure"] and episode.failure else episode
     if (episode.score, len(episode.actions), episode.failure) != (row["score"], row["length"], row["failure"]):
         raise Unplayable(
-            f"{row['split']} row {row['row']} of {row['folder']} goes otherwise when it is played again: return "
+            f"{row['split']} row {row['row']} of {row['folder']} differs when it is played again: return "
             f"{episode.score:g} after {len(episode.actions)} steps, not {row['score']:g} after {row['length']}; "
-            "play it where it was played first, with the same versions (see its provenance.json)"
+            "play it on the machine and with the versions that its provenance.json names"
         )
     return episode

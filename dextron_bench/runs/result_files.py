@@ -1,110 +1,121 @@
-"""The two sides of a comparison: results found by label or path, and their scores on the same settings."""
+"""`result.json`: written from the table of episodes, read with checks, found by label or path."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from dextron_bench.evaluation.episodes import action_hashes
-from dextron_bench.methods import registry
-from dextron_bench.runs import result_files
-from dextron_bench.runs.run_files import CONFIG, PROVENANCE
+from dextron_bench.methods.registry import NAME
 from dextron_bench.storage import atomic
+from dextron_bench.storage.run_folder import RunFolder, run_folders, seed_folders
 
-PUBLISHED = Path("leaderboard/results")
+MAKER = ("method", "code", "settings")  # Entries of a run's config that a result repeats: they make the agent again.
 Results = Sequence[dict[str, Any]]
 
 
 class UnknownResult(LookupError):
-    """A name by which no result is found."""
+    """A name that no result has."""
 
 
-def find(name: str, runs: Path) -> Results:
-    """One method's results: by its label in a folder of runs, else among the published ones, else by a path.
+def write_result(folder: RunFolder, table: pd.DataFrame, about: dict[str, Any], seconds: float | None = None) -> None:
+    """Writes the result of a run: the score of every episode, how episodes end, and what made them.
 
-    A path is a `result.json`, a run's folder, or the folder of a method's runs. Raises UnknownResult, DamagedFile.
+    `seconds` of training belong to the provenance, since they differ each time.
     """
-    files: list[Path] = []
-    if registry.NAME.fullmatch(name):
-        every = (sorted(folder.glob(f"{name}/*/seed*/{result_files.RESULT}")) for folder in (runs, PUBLISHED))
-        files = next(filter(None, every), [])
-    if not files:
-        path, folders = Path(name), ("", "seed*/", "*/seed*/")
-        files = (
-            [path]
-            if path.is_file()
-            else [file for each in folders for file in sorted(path.glob(each + result_files.RESULT))]
-        )
-    if not files:
-        raise UnknownResult(
-            f"no result of {name!r}; {runs} and {PUBLISHED} have {_known(runs)}, or give the path of a run"
-        )
-    results = [result_files.read_result(file) for file in files]
-    if len(labels := {result["method"] for result in results}) > 1:
-        raise UnknownResult(f"{name!r} holds results of {_listed(labels)}; give one of them")
-    return results
+    config, provenance = atomic.read_json(folder.config), atomic.read_json(folder.provenance)
+    provenance |= {} if seconds is None else {"seconds": seconds}
+    maker = {name: config[name] for name in MAKER if name in config}
+    result = {**about, "splits": scores_by_split(table), "provenance": provenance, "maker": maker}
+    atomic.write_json(folder.result, result)
 
 
-def _known(runs: Path) -> str:
-    files = [file for folder in (runs, PUBLISHED) for file in folder.glob(f"*/*/seed*/{result_files.RESULT}")]
-    return _listed({file.parts[-4] for file in files}) or "none"
-
-
-def _listed(names: Sequence[str] | set[str] | dict[str, Any]) -> str:
-    return ", ".join(sorted(names))
-
-
-RESULT = "result.json"
-
-
-MAKER = ("method", "code", "settings")  # Of a run's config, what a result repeats: by it the agent is made again.
-
-
-def conclude(folder: Path, episodes: pd.DataFrame, about: dict[str, Any], seconds: float | None = None) -> None:
-    """Writes the result: every episode's score, from which the leaderboard is computed, and how episodes end.
-
-    `seconds` of training are part of where it was made, which differs from one making to the next.
-    """
-    made = atomic.read_json(folder / CONFIG)
-    found = {"splits": scores(episodes), "provenance": atomic.read_json(folder / PROVENANCE)}
-    found["provenance"] |= {} if seconds is None else {"seconds": seconds}
-    found["maker"] = {name: made[name] for name in MAKER if name in made}
-    atomic.write_json(folder / RESULT, {**about, **found})
-
-
-def scores(episodes: pd.DataFrame) -> dict[str, Any]:
-    """What a result says of each split, from the rows of its episodes."""
-    return {str(name): _scores(rows) for name, rows in episodes.groupby("split", sort=False)}
+def scores_by_split(table: pd.DataFrame) -> dict[str, Any]:
+    """What a result says of each split, computed from the rows of its episodes."""
+    return {str(name): _scores(rows) for name, rows in table.groupby("split", sort=False)}
 
 
 def _scores(rows: pd.DataFrame) -> dict[str, Any]:
-    told = {
+    scores = {
         "digest": rows["digest"].iloc[0],
         "scores": rows["score"].tolist(),
         "failed": int((rows["failure"] != "").sum()),
         "causes": {cause: int(count) for cause, count in rows["cause"].value_counts(sort=False).items()},
         "closing_lag": None if rows["closing_lag"].isna().all() else round(float(rows["closing_lag"].median()), 3),
     }
-    kept = rows["actions"] if "actions" in rows else pd.Series([None])
-    return told if kept.isna().any() else told | {"actions": action_hashes(kept)}
+    actions = rows["actions"] if "actions" in rows else pd.Series([None])
+    return scores if actions.isna().any() else scores | {"actions": action_hashes(actions)}
 
 
-def results(folder: Path) -> Iterator[dict[str, Any]]:
+def results(runs: Path) -> Iterator[dict[str, Any]]:
     """Every result below a folder of runs; raises DamagedFile."""
-    for file in sorted(folder.glob(f"*/*/seed*/{RESULT}")):
-        yield read_result(file)
+    return (read_result(run.result) for run in finished(runs))
+
+
+def finished(runs: Path, label: str = "*") -> list[RunFolder]:
+    """The run folders below a folder of runs that hold a result, sorted."""
+    return [run for run in run_folders(runs, label) if run.result.exists()]
 
 
 def read_result(file: Path) -> dict[str, Any]:
     """The content of a `result.json`; raises DamagedFile."""
-    found = atomic.read_json(file)
+    result = atomic.read_json(file)
     try:
-        parts = [found["method"], found["reaches"], found["seed"]]
-        for each in found["splits"].values():
-            parts += [each["digest"][:8], sum(each["scores"]), each["failed"], sum(each["causes"].values())]
+        parts = [result["method"], result["reaches"], result["seed"]]
+        for split in result["splits"].values():
+            parts += [split["digest"][:8], sum(split["scores"]), split["failed"], sum(split["causes"].values())]
     except (KeyError, TypeError, AttributeError) as error:
         raise atomic.DamagedFile(file, f"no result: {type(error).__name__} {error}") from error
-    return found
+    return result
+
+
+def published_results() -> Path:
+    """The folder of published results: package data, or `leaderboard/results` in a checkout."""
+    package = Path(str(files("dextron_bench")))
+    shipped = package / "data" / "results"
+    return shipped if shipped.is_dir() else package.parent / "leaderboard" / "results"
+
+
+def find(name: str, runs: Path) -> Results:
+    """The results of one method: by its label in `runs`, else among the published results, else by a path.
+
+    A path is a `result.json`, a run's folder, or the folder of a method's runs. Raises UnknownResult, DamagedFile.
+    """
+    results = [read_result(file) for file in _files(name, runs)]
+    if not results:
+        raise UnknownResult(
+            f"no result of {name!r}: {runs} has {_labels(runs)}, and published results are "
+            f"{_labels(published_results())}; give one of them, or the path of a run"
+        )
+    if len(labels := {result["method"] for result in results}) > 1:
+        raise UnknownResult(f"{name!r} holds results of {_listed(labels)}; give one of them")
+    return results
+
+
+def _files(name: str, runs: Path) -> list[Path]:
+    """The files of a method's results, from the first place that has some."""
+    if NAME.fullmatch(name):
+        for folder in (runs, published_results()):
+            if labelled := finished(folder, name):
+                return [run.result for run in labelled]
+    path = Path(name)
+    if path.is_file():
+        return [path]
+    depths = (
+        [RunFolder(path)],
+        seed_folders(path),
+        [run for place in sorted(path.glob("*")) for run in seed_folders(place)],
+    )
+    return next(filter(None, ([run.result for run in depth if run.result.exists()] for depth in depths)), [])
+
+
+def _labels(runs: Path) -> str:
+    return _listed({run.label for run in finished(runs)}) or "none"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(sorted(names))

@@ -1,4 +1,4 @@
-"""What to look at: the recordings at a place, or episodes picked from the tables of runs."""
+"""Selects what to look at: the recordings at a place, or episodes from the tables of runs."""
 
 from __future__ import annotations
 
@@ -9,26 +9,28 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench.evaluation import diagnosis
+from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.runs import recording_files, result_files, run_files
 from dextron_bench.storage import atomic
+from dextron_bench.storage.run_folder import RunFolder, below
 
-LIMIT = 5  # Episodes that are picked where nobody says how many.
+LIMIT = 5  # Episodes that are selected if the filter names no number.
 
 
 class NoEpisodes(ValueError):
-    """A place without recordings, or a wish that no episode fulfils."""
+    """A place without recordings, or a filter that no episode passes."""
 
 
 class BadFilter(ValueError):
-    """A wish that cannot be."""
+    """A filter that contradicts itself."""
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeFilter:
-    """Which episodes of which runs; what is empty stands for any, and so does False. Raises BadFilter.
+    """Which episodes of which runs to select; an empty entry, and False, select all. Raises BadFilter.
 
-    `worst` and `best` say how many of the lowest and of the highest returns; without either the first LIMIT are meant.
+    `worst` and `best` are numbers of episodes with the lowest and the highest returns; without either, the first LIMIT
+    episodes are selected.
     """
 
     method: tuple[str, ...] = ()
@@ -44,93 +46,94 @@ class EpisodeFilter:
     def __post_init__(self) -> None:
         for name in ("worst", "best"):
             if (count := getattr(self, name)) is not None and count < 1:
-                raise BadFilter(f"--{name} {count}: pick 1 episode or more")
+                raise BadFilter(f"--{name} {count}: select 1 episode or more")
 
 
 def recordings(places: Sequence[Path]) -> list[Path]:
     """The recordings at places, each a recording or a folder; raises NoEpisodes."""
-    found: dict[Path, None] = {}
+    files: dict[Path, None] = {}
     for place in places:
         if not place.exists():
-            raise NoEpisodes(f"there is no {place}; `dextron-bench run --record 3` makes recordings, in runs")
+            raise NoEpisodes(f"{place} does not exist; `dextron-bench run --record 3` makes recordings, in runs")
         here = [place] if place.is_file() else sorted(file for file in place.glob("**/*.rrd") if file.is_file())
         if not here:
             raise NoEpisodes(f"no recordings at {place}; make some with `dextron-bench run --record 3`")
-        found |= dict.fromkeys(here)
-    return list(found)
+        files |= dict.fromkeys(here)
+    return list(files)
 
 
 def hashes(files: Sequence[Path]) -> dict[Path, str]:
-    """The SHA-256 of those recordings of which their run's manifest tells one; raises DamagedFile."""
-    manifests = {run: recording_files.manifest(run) for run in {file.parent.parent for file in files}}
-    told = [(file, manifests[file.parent.parent]) for file in files]
-    return {file: manifest[file.name] for file, manifest in told if file.name in manifest}
+    """The SHA-256 of each recording that the manifest of its run lists; raises DamagedFile."""
+    manifests = {
+        folder: recording_files.manifest(RunFolder(folder)) for folder in {file.parent.parent for file in files}
+    }
+    listed = [(file, manifests[file.parent.parent]) for file in files]
+    return {file: manifest[file.name] for file, manifest in listed if file.name in manifest}
 
 
 def episodes(places: Sequence[Path]) -> pd.DataFrame:
-    """The episodes of all runs at places: their tables' rows, with `folder`, `method`, `reaches` and `seed` of the run.
+    """The episodes of all runs at places: rows of their tables, with `folder`, `method`, `reaches` and `seed`.
 
     Raises NoEpisodes, DamagedFile.
     """
     tables = [
-        run_files.stored(folder, ()).assign(folder=str(folder), **run_identity(folder)) for folder in _runs(places)
+        run_files.stored_episodes(run, ()).assign(folder=str(run.path), **run_identity(run)) for run in _runs(places)
     ]
     return pd.concat(tables, ignore_index=True)
 
 
-def run_identity(folder: Path) -> dict[str, Any]:
-    """Method, source of reaches and seed of a run, as its recordings tell them; raises DamagedFile."""
-    if (folder / result_files.RESULT).exists():
-        told = result_files.read_result(folder / result_files.RESULT)
-    else:  # A run under way, whose folder is called after it.
-        told = atomic.read_json(folder / run_files.CONFIG) | {"method": folder.resolve().parents[1].name}
+def run_identity(run: RunFolder) -> dict[str, Any]:
+    """Method, source of reaches and seed of a run, as its recordings have them; raises DamagedFile."""
+    if run.result.exists():
+        content = result_files.read_result(run.result)
+    else:  # A run without a result yet; its path has the label.
+        content = atomic.read_json(run.config) | {"method": run.label}
     try:
-        return {name: told[name] for name in ("method", "reaches", "seed")}
+        return {name: content[name] for name in ("method", "reaches", "seed")}
     except KeyError as error:
-        raise atomic.DamagedFile(folder / run_files.CONFIG, f"it lacks {error}") from error
+        raise atomic.DamagedFile(run.config, f"it lacks {error}") from error
 
 
-def select(table: pd.DataFrame, wish: EpisodeFilter) -> tuple[pd.DataFrame, int]:
-    """The episodes that a wish picks, and how many it might have picked; raises NoEpisodes."""
-    alike = matching(table, wish)
-    seen = alike[alike["length"] > 0]
-    if seen.empty:
-        unseen = "; the agent failed before their first step" if len(alike) else ""
-        raise NoEpisodes(f"of {len(table)} episodes {len(alike)} are as asked for{unseen}")
-    if wish.worst is None and wish.best is None:
-        return seen.head(LIMIT), len(seen)
-    worst = seen.sort_values("score", kind="stable").head(wish.worst or 0)
-    best = seen.sort_values("score", ascending=False, kind="stable").head(wish.best or 0)
-    picked = pd.concat([worst, best])
-    return picked[~picked.index.duplicated()], len(seen)
+def select(table: pd.DataFrame, wanted: EpisodeFilter) -> tuple[pd.DataFrame, int]:
+    """The episodes that a filter selects, and the number that pass it; raises NoEpisodes."""
+    passing = matching(table, wanted)
+    played = passing[passing["length"] > 0]
+    if played.empty:
+        unplayed = "; the agent failed before their first step" if len(passing) else ""
+        raise NoEpisodes(f"{len(passing)} of {len(table)} episodes pass the filter{unplayed}")
+    if wanted.worst is None and wanted.best is None:
+        return played.head(LIMIT), len(played)
+    worst = played.sort_values("score", kind="stable").head(wanted.worst or 0)
+    best = played.sort_values("score", ascending=False, kind="stable").head(wanted.best or 0)
+    selected = pd.concat([worst, best])
+    return selected[~selected.index.duplicated()], len(played)
 
 
-def matching(table: pd.DataFrame, wish: EpisodeFilter) -> pd.DataFrame:
-    """The episodes of the runs, on the splits and with the ends that are wished for; raises NoEpisodes."""
-    found = table
+def matching(table: pd.DataFrame, wanted: EpisodeFilter) -> pd.DataFrame:
+    """The episodes that pass a filter, whatever their number; raises NoEpisodes."""
     for name in ("method", "reaches", "split", "seed", "row", "cause"):
-        if wanted := getattr(wish, name):
-            _check(table, name, wanted)
-            found = found[found[name].isin(wanted)]
-    return found[~found["success"]] if wish.failed else found
+        if values := getattr(wanted, name):
+            _check(table, name, values)
+            table = table[table[name].isin(values)]
+    return table[~table["success"]] if wanted.failed else table
 
 
-def _runs(places: Sequence[Path]) -> list[Path]:
+def _runs(places: Sequence[Path]) -> list[RunFolder]:
     """The folders of runs at or below places, each once."""
-    found: dict[Path, None] = {}
+    runs: dict[RunFolder, None] = {}
     for place in places:
         if place.is_file():
-            raise NoEpisodes(f"{place} is a file: episodes are picked from runs; name a run's folder instead")
-        here = [file.parent for file in sorted(place.glob(f"**/{run_files.EPISODES}"))]
+            raise NoEpisodes(f"{place} is a file, and episodes are selected from runs; name a run's folder instead")
+        here = list(below(place, RunFolder(place).episodes.name))
         if not here:
-            raise NoEpisodes(f"no runs at {place} to pick episodes from; make one with `dextron-bench run`")
-        found |= dict.fromkeys(here)
-    return list(found)
+            raise NoEpisodes(f"no runs at {place} to select episodes from; make one with `dextron-bench run`")
+        runs |= dict.fromkeys(here)
+    return list(runs)
 
 
-def _check(table: pd.DataFrame, name: str, wanted: Sequence[str | int]) -> None:
-    """Raises NoEpisodes, with what there is, for what no episode has."""
-    known = list(diagnosis.CAUSES) if name == "cause" else sorted(table[name].unique())
-    if lost := [each for each in wanted if each not in known]:
-        there = f"{known[0]} to {known[-1]}" if name == "row" else ", ".join(map(str, known))
-        raise NoEpisodes(f"no episode has {name} {lost[0]!r}; there are {there}")
+def _check(table: pd.DataFrame, name: str, values: Sequence[str | int]) -> None:
+    """Raises NoEpisodes, with the valid values, for a value that no episode has."""
+    valid = list(CAUSES) if name == "cause" else sorted(table[name].unique())
+    if unknown := [value for value in values if value not in valid]:
+        choice = f"{valid[0]} to {valid[-1]}" if name == "row" else ", ".join(map(str, valid))
+        raise NoEpisodes(f"no episode has {name} {unknown[0]!r}; choose from {choice}")

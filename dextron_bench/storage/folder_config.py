@@ -1,4 +1,4 @@
-"""A folder belongs to one config: the first writer records it, later writers must have the same."""
+"""A folder belongs to one config: the first writer records it, and later writers must have the same."""
 
 from __future__ import annotations
 
@@ -7,31 +7,49 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, provenance
+from dextron_bench.storage.run_folder import RunFolder
+
+RUN_ADVICE = "remove it, or choose another folder with --runs"
 
 
 class FolderMismatch(ValueError):
     """A folder that belongs to another config than the given one."""
 
 
-def check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
-    """Raises FolderMismatch if `file` holds another config than this one, DamagedFile if it cannot be read.
+def check(folder: Path, config: Mapping[str, Any]) -> None:
+    """Raises FolderMismatch if a folder holds a run of another config, DamagedFile if its config cannot be read."""
+    _check(RunFolder(folder).config, config, "run", RUN_ADVICE)
 
-    A file that does not exist raises nothing. The message says that the folder holds another `content`, such as
-    "run", names the entries that differ, and ends with `advice`.
+
+def write_or_check(folder: Path, config: Mapping[str, Any]) -> None:
+    """Writes config and provenance of a run if there is no config yet; raises the same errors as `check`.
+
+    `config` has the hash of the physics.
     """
+    run = RunFolder(folder)
+    if not run.config.exists():  # The config is written last: if it exists, the provenance exists too.
+        atomic.write_json(run.provenance, provenance.collect(config["physics"]))
+    write_or_check_file(run.config, config, "run", RUN_ADVICE)
+
+
+def write_or_check_file(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
+    """Writes a config to a file that does not exist yet; raises FolderMismatch if the file holds another config.
+
+    The message says that the folder holds another `content`, such as "search", names the entries that differ, and ends
+    with `advice`.
+    """
+    if not file.exists():
+        atomic.write_json(file, config)
+    _check(file, config, content, advice)
+
+
+def _check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
     if not file.exists():
         return
     stored, expected = atomic.read_json(file), json.loads(json.dumps(config))
     if names := list(_differences(stored, expected)):
         raise FolderMismatch(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")
-
-
-def write_or_check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
-    """Writes the config if `file` does not exist; raises the same errors as `check`."""
-    if not file.exists():
-        atomic.write_json(file, config)
-    check(file, config, content, advice)
 
 
 def _differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:

@@ -36,7 +36,7 @@ class Busy(RuntimeError):
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class TrainingProgress:
     """How far a training is, and the device that it computes on."""
 
     epoch: int
@@ -71,17 +71,17 @@ class Checkpoints:
                 file.unlink()
             yield
 
-    def progress(self) -> Progress | None:
+    def progress(self) -> TrainingProgress | None:
         """How far the last checkpoint is; None where there is none. Raises DamagedFile."""
         file = self.folder / CHECKPOINT
         if not file.exists():
             return None
         try:
-            return Progress(**tensors.read_about(file))
+            return TrainingProgress(**tensors.read_about(file))
         except (tensors.BadTensors, TypeError) as error:
             raise self._damaged(CHECKPOINT) from error
 
-    def save(self, trainer: Trainer, done: Progress, rows: list[dict[str, Any]], about: dict[str, Any]) -> None:
+    def save(self, trainer: Trainer, done: TrainingProgress, rows: list[dict[str, Any]], about: dict[str, Any]) -> None:
         """Writes a checkpoint after a period whose metrics are `rows`; `about` goes with the weights."""
         epoch = done.epoch
         tensors.write(self._journal(epoch), trainer.journal(), {"epoch": epoch})

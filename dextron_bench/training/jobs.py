@@ -1,4 +1,4 @@
-"""Which seeds of a method are still to be trained, and what their training leaves in the folders of runs."""
+"""Training jobs: which seeds still need training, and what a training leaves in the folders of runs."""
 
 from __future__ import annotations
 
@@ -6,31 +6,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dextron_bench.methods import registry, weights
+from dextron_bench.methods import registry
 from dextron_bench.methods.learners import Learner, Track
 from dextron_bench.reaches import sources
-from dextron_bench.runs import run_files
 from dextron_bench.splits.loading import load_split
-from dextron_bench.storage import atomic, tensors
+from dextron_bench.storage import atomic, folder_config, tensors
+from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.run_folder import RunFolder, source_folder
 from dextron_bench.training import loop, timing
 from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.training.learning_curve import Curve
 
-CURVE = "curve.json"  # In a run's folder.
-
 
 class NoDevice(ValueError):
-    """A device that this machine has not."""
-
-
-def place(runs: Path, learner: Learner, reaches: str, seed: int) -> Path:
-    """The folder of a learner's run."""
-    return runs / learner.label / reaches / f"seed{seed}"
+    """A device that this machine does not have."""
 
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """The training of a learner on a source of reaches."""
+    """The training of a learner on a source of reaches, for any seeds."""
 
     learner: Learner
     reaches: str
@@ -39,74 +33,72 @@ class TrainingJob:
     device: str = "cpu"
 
     def groups(self, seeds: Sequence[int]) -> list[tuple[int, ...]]:
-        """The seeds that need training, as they train together; those whose training is over first."""
-        missing = [seed for seed in dict.fromkeys(seeds) if not (self._run(seed) / weights.FILE).exists()]
-        over = [group for group in self._over() if set(group) & set(missing)]
-        rest = tuple(seed for seed in missing if not any(seed in group for group in over))
-        return [*over, rest] if rest else over
+        """The seeds that need training, in the groups that train together; finished groups come first."""
+        missing = [seed for seed in dict.fromkeys(seeds) if not self.run_folder(seed).weights.exists()]
+        finished = [group for group in self._finished() if set(group) & set(missing)]
+        rest = tuple(seed for seed in missing if not any(seed in group for group in finished))
+        return [*finished, rest] if rest else finished
 
-    def run(self, seeds: Sequence[int], report: loop.Report | None = None) -> None:
-        """Trains seeds that are not trained yet, and puts best weights and curve into the folders of their runs.
+    def run(self, seeds: Sequence[int], report: Progress = no_progress) -> None:
+        """Trains the seeds that need it, and writes best weights and curve into the folders of their runs.
 
         Raises Diverged, AgentError, Busy, NoDevice, FolderMismatch, DamagedFile, UnknownSplit, MissingData.
         """
         for seed in seeds:
-            run_files.check(self._run(seed), registry.config(self.learner, self.reaches, seed))
+            folder_config.check(self.run_folder(seed).path, registry.run_config(self.learner, self.reaches, seed))
         for group in self.groups(seeds):
             track, val = self.track(), load_split(self.reaches, "val")
-            folder = loop.folder_of(self._base, group)
             for seed in group:
-                run_files.claim(self._run(seed), registry.config(self.learner, self.reaches, seed))
-            done = loop.train(self.learner, track, group, folder, val, report or loop.quiet)
-            curve = Curve(self.learner, done, track.source, val, self.threads)
+                config = registry.run_config(self.learner, self.reaches, seed)
+                folder_config.write_or_check(self.run_folder(seed).path, config)
+            checkpoints = loop.train(self.learner, track, group, self.training_folder(group), val, report)
+            curve = Curve(self.learner, checkpoints, track.source, val, self.threads)
             for seed in group:
-                self._publish_best(done, curve, seed)
+                self._publish_best(checkpoints, curve, seed)
 
     def track(self) -> Track:
-        """What there is to train with; raises NoDevice, UnknownSplit, MissingData."""
+        """What the learner trains with; raises NoDevice, UnknownSplit, MissingData."""
         cases = load_split(self.reaches, "train").cases
         source = sources.open_source(self.reaches)
         return Track(source, cases, self.runs / "cache", self.threads, _device(self.device))
 
-    def folder(self, group: Sequence[int]) -> Path:
-        """Where a group trains."""
-        return loop.folder_of(self._base, group)
+    def run_folder(self, seed: int) -> RunFolder:
+        """The folder of a seed's run."""
+        return RunFolder.of(self.runs, self.learner.label, self.reaches, seed)
+
+    def training_folder(self, group: Sequence[int]) -> Path:
+        """The folder in which a group of seeds trains."""
+        return loop.folder_of(self._source_folder, group)
 
     def seconds(self, seed: int) -> float | None:
-        """How long the training of a seed's group took; None where its folder is not there."""
-        found = [each for each in self._over() if seed in each]
-        return timing.seconds(self.folder(found[0])) if found else None
+        """Duration of the training of a seed's group [s]; None if there is no such training."""
+        groups = [group for group in self._finished() if seed in group]
+        return timing.seconds(self.training_folder(groups[0])) if groups else None
 
     @property
-    def _base(self) -> Path:
-        return self.runs / self.learner.label / self.reaches
+    def _source_folder(self) -> Path:
+        return source_folder(self.runs, self.learner.label, self.reaches)
 
-    def _run(self, seed: int) -> Path:
-        return place(self.runs, self.learner, self.reaches, seed)
-
-    def _over(self) -> list[tuple[int, ...]]:
+    def _finished(self) -> list[tuple[int, ...]]:
         """The groups whose epochs are all done."""
-        found = []
-        for folder, group in loop.groups(self._base).items():
-            progress = Checkpoints(folder, group).progress()
-            if progress and progress.over:
-                found.append(group)
-        return found
+        folders = loop.training_folders(self._source_folder)
+        progress = {group: Checkpoints(folder, group).progress() for folder, group in folders.items()}
+        return [group for group, state in progress.items() if state and state.over]
 
-    def _publish_best(self, done: Checkpoints, curve: Curve, seed: int) -> None:
-        """Puts a seed's learning curve and best weights into the folder of its run, the weights last."""
-        best, last = curve.best(seed), done.epochs()[-1]
-        snapshot = done.snapshot(best, seed)
-        frames = tensors.read_about(done.snapshot(last, seed)).get("frames")
+    def _publish_best(self, checkpoints: Checkpoints, curve: Curve, seed: int) -> None:
+        """Writes learning curve and best weights of a seed into the folder of its run, the weights last."""
+        best, last = curve.best(seed), checkpoints.epochs()[-1]
+        snapshot, run = checkpoints.snapshot(best, seed), self.run_folder(seed)
+        frames = tensors.read_about(checkpoints.snapshot(last, seed)).get("frames")
         about = tensors.read_about(snapshot) | {"best_epoch": best, "epochs": last, "frames": frames and int(frames)}
         del about["epoch"]
-        atomic.write_json(self._run(seed) / CURVE, {"split": "val", "points": curve.points(seed)})
-        tensors.write(self._run(seed) / weights.FILE, tensors.read(snapshot), about | {"reaches": self.reaches})
+        atomic.write_json(run.curve, {"split": "val", "points": curve.points(seed)})
+        tensors.write(run.weights, tensors.read(snapshot), about | {"reaches": self.reaches})
 
 
 @dataclass(frozen=True, slots=True)
-class UnderWay:
-    """A training that is not over: what is left of it, in words."""
+class UnfinishedTraining:
+    """A training with epochs left; `left` says how many, in words."""
 
     label: str
     reaches: str
@@ -114,19 +106,20 @@ class UnderWay:
     left: str
 
 
-def under_way(runs: Path) -> list[UnderWay]:
-    """The trainings below a folder of runs that are not over; raises DamagedFile."""
-    found = []
-    for folder, group in loop.groups(runs, "*/*/").items():
+def unfinished(runs: Path) -> list[UnfinishedTraining]:
+    """The trainings below a folder of runs that have epochs left; raises DamagedFile."""
+    trainings = []
+    for folder, group in loop.training_folders(runs, "*/*/").items():
         progress = Checkpoints(folder, group).progress()
         if not progress or not progress.over:
             left = f"{progress.epochs - progress.epoch} of {progress.epochs} epochs" if progress else "all epochs"
-            found.append(UnderWay(folder.parts[-3], folder.parts[-2], group, left))
-    return found
+            label, reaches = folder.parts[-3:-1]
+            trainings.append(UnfinishedTraining(label, reaches, group, left))
+    return trainings
 
 
 def _device(name: str) -> str:
-    """The device of that name; `auto` is a GPU where there is one. Raises NoDevice."""
+    """The device of that name; `auto` is a GPU if there is one. Raises NoDevice."""
     if name == "cpu":
         return name
     import torch
@@ -135,4 +128,4 @@ def _device(name: str) -> str:
         return "cuda"
     if name == "auto":
         return "cpu"
-    raise NoDevice("no CUDA device is at hand; `dextron-bench doctor` shows what is. Leave out --device, or say auto")
+    raise NoDevice("this machine has no CUDA device (see `dextron-bench doctor`); leave out --device, or use auto")

@@ -18,45 +18,62 @@ from dextron_bench.storage.atomic import DamagedFile, read_json
 from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.world import task
 
-CURVE = 50  # Rows of `val` that make a point of the curve.
-FINALISTS = 5  # Best snapshots of a curve, which all of `val` decides between.
+POINT_ROWS = 50  # Rows of `val` that make a point of the curve.
+FINALISTS = 5  # Snapshots with the best points; all of `val` decides between them.
 
 
 class Curve:
-    """Scores of a training's snapshots on `val`, played where they are not in store."""
+    """Scores of a training's snapshots on `val`, played if no file holds them yet."""
 
-    def __init__(self, learner: Learner, done: Checkpoints, source: Source, val: Split, threads: int = 0) -> None:
-        self._learner, self._done, self._source, self._val, self._threads = learner, done, source, val, threads
+    def __init__(
+        self, learner: Learner, checkpoints: Checkpoints, source: Source, val: Split, threads: int = 0
+    ) -> None:
+        self._learner, self._checkpoints, self._source, self._val = learner, checkpoints, source, val
+        self._threads = threads
+        self._known: dict[Path, list[float]] = {}  # Scores by their file, read or played by this object.
 
-    def extend(self) -> dict[int, float]:
-        """Scores the snapshots that have no point yet; returns the last point [mean return] of each seed."""
-        last: dict[int, float] = {}
-        for epoch in self._done.epochs():
-            last = {seed: mean(self._scores(epoch, seed, CURVE)) for seed in self._done.seeds}
-        return last
+    def score_snapshots(self) -> None:
+        """Plays the episodes of every point that is not scored yet."""
+        for epoch in self._checkpoints.epochs():
+            for seed in self._checkpoints.seeds:
+                self._scores(epoch, seed, POINT_ROWS)
+
+    def last_point(self) -> dict[int, float]:
+        """Mean return [0, 20] of each seed at the newest snapshot; empty if there is no snapshot."""
+        epochs = self._checkpoints.epochs()
+        return {seed: mean(self._scores(epochs[-1], seed, POINT_ROWS)) for seed in self._checkpoints.seeds if epochs}
 
     def points(self, seed: int) -> list[dict[str, Any]]:
         """The curve of a seed: epoch, mean return [0, 20] and share of successes [0, 1]."""
-        found = []
-        for epoch in self._done.epochs():
-            scores = self._scores(epoch, seed, CURVE)
+        points = []
+        for epoch in self._checkpoints.epochs():
+            scores = self._scores(epoch, seed, POINT_ROWS)
             success = sum(score == task.SUCCESS for score in scores) / len(scores)
-            found.append({"epoch": epoch, "return": mean(scores), "success": success})
-        return found
+            points.append({"epoch": epoch, "return": mean(scores), "success": success})
+        return points
 
     def best(self, seed: int) -> int:
         """The epoch of the snapshot with the highest mean on all of `val`; of equal ones the later."""
-        ranked = sorted((mean(self._scores(epoch, seed, CURVE)), epoch) for epoch in self._done.epochs())
-        finals = [(mean(self._scores(epoch, seed, len(self._val.cases))), epoch) for _, epoch in ranked[-FINALISTS:]]
+        ranked = sorted((mean(self._scores(epoch, seed, POINT_ROWS)), epoch) for epoch in self._checkpoints.epochs())
+        rows = len(self._val.cases)
+        finals = [(mean(self._scores(epoch, seed, rows)), epoch) for _, epoch in ranked[-FINALISTS:]]
         return max(finals)[1]
 
     def _scores(self, epoch: int, seed: int, rows: int) -> list[float]:
         """Scores on the first rows of `val`."""
         rows = min(rows, len(self._val.cases))
-        snapshot = self._done.snapshot(epoch, seed)
+        snapshot = self._checkpoints.snapshot(epoch, seed)
         file = snapshot.with_name(f"{snapshot.stem}-val{rows}.json")
-        if file.exists() and (found := read_json(file)).get("digest") == self._val.digest:
-            return found["scores"]
+        if file not in self._known:
+            self._known[file] = self._stored(file) or self._play_and_store(snapshot, file, rows)
+        return self._known[file]
+
+    def _stored(self, file: Path) -> list[float]:
+        """The scores in a file; empty if there are none on this version of `val`."""
+        content = read_json(file) if file.exists() else {}
+        return content["scores"] if content.get("digest") == self._val.digest else []
+
+    def _play_and_store(self, snapshot: Path, file: Path, rows: int) -> list[float]:
         scores = self._play(snapshot, rows)
         atomic.write_json(file, {"digest": self._val.digest, "scores": scores})
         return scores
@@ -69,8 +86,8 @@ class Curve:
         with as_agent_error(f"policy() of method {self._learner.name!r}"):
             agent = self._learner.policy(weights)
         cases = self._val.cases[:rows]
-        scores = {index: each.score for index, each in rollout(agent, self._source, cases, threads=self._threads)}
-        return [scores[index] for index in range(rows)]
+        scores = {row: episode.score for row, episode in rollout(agent, self._source, cases, threads=self._threads)}
+        return [scores[row] for row in range(rows)]
 
 
 def mean(scores: list[float]) -> float:

@@ -1,4 +1,4 @@
-"""How long epochs and evaluations of a training took, and how long the next ones take."""
+"""Durations of epochs and evaluations of a training, and estimates made of them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,20 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-TIMING = "timing.jsonl"
+FILE = "timing.jsonl"  # In the folder of a training.
+RECENT = 50  # Newest rows that an estimate uses.
 
 
-RECENT = 50  # Epochs whose time tells that of the next.
+def append(folder: Path, activity: str, epoch: int, seconds: float, device: str) -> None:
+    """Adds a row: `activity` is "epoch" or "evaluation"."""
+    row = {"what": activity, "epoch": epoch, "seconds": round(seconds, 4), "device": device}
+    with (folder / FILE).open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row) + "\n")
 
 
 def seconds_left(folder: Path, epochs: int, period: int) -> float | None:
-    """About how long so many more epochs take [s], from those before; None where there are none."""
-    rows = _timings(folder / TIMING)
+    """Estimated duration of further epochs [s], from the newest rows; None if no epoch was timed."""
+    rows = _rows(folder)
     trained = [row["seconds"] for row in rows if row["what"] == "epoch"][-RECENT:]
     scored = [row["seconds"] for row in rows if row["what"] == "evaluation"][-RECENT:]
     if not trained:
@@ -25,14 +30,14 @@ def seconds_left(folder: Path, epochs: int, period: int) -> float | None:
 
 
 def seconds(folder: Path) -> float | None:
-    """How long a training took so far, epochs and evaluations of its learning curve; None where it is not known."""
-    rows = _timings(folder / TIMING)
+    """Duration of a training so far [s], epochs and evaluations of its learning curve; None if nothing was timed."""
+    rows = _rows(folder)
     return round(sum(row["seconds"] for row in rows), 1) if rows else None
 
 
-def _timings(file: Path) -> list[dict[str, Any]]:
-    """The rows of a file of timings; lines that were cut off are left out."""
-    rows = []
+def _rows(folder: Path) -> list[dict[str, Any]]:
+    """All whole rows; a line that was cut off is left out."""
+    file, rows = folder / FILE, []
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
         try:
             rows.append(json.loads(line))

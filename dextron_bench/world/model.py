@@ -9,7 +9,7 @@ from importlib.resources import files
 import mujoco
 import numpy as np
 
-from dextron_bench.reaches.reach import CONTROL_STEP
+from dextron_bench.reaches.timing import CONTROL_STEP
 
 DIGITS = ("thumb", "index", "middle", "ring", "little")
 STATE = 48  # qpos (25), then qvel (23).

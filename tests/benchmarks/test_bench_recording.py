@@ -16,6 +16,7 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.runs import run_files
 from dextron_bench.splits.loading import Split
+from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.success.network import SIZES, SuccessModel
 from dextron_bench.success.predict import predict
 from tests.benchmarks.measure import Row, alone, in_turns, note, scaled
@@ -47,7 +48,7 @@ class LiveView:
         """Writes the table of a run, from which each can be played again."""
         split = Split("test", self.source.name, tuple(self.cases), "")
         rows = [episode_table.row(split, index, self.episodes[index]) for index in range(len(self.cases))]
-        run_files.store(self.folder, pd.DataFrame(rows))
+        run_files.store_episodes(RunFolder(self.folder), pd.DataFrame(rows))
 
     def record(self) -> None:
         """Writes recordings."""

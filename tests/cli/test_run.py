@@ -134,7 +134,7 @@ def test_flags_of_a_method_are_in_the_help(here: Path, capsys: pytest.CaptureFix
         (["--breaks", "1"], "epoch 1 of method 'toy-0.1' raised ZeroDivisionError: toys break"),
         (["--spoils", "1"], "diverged: 'loss' of seed 0 is nan in epoch 1; there is no checkpoint yet in runs/toy-0.1"),
         (["--every", "0"], "needs at least one epoch and a period of at least one"),
-        (["--device", "cuda"], "no CUDA device is at hand"),
+        (["--device", "cuda"], "this machine has no CUDA device"),
     ],
 )
 def test_what_goes_wrong_is_one_line(

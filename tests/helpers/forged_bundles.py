@@ -19,6 +19,7 @@ from dextron_bench.leaderboard.submission.verdict import Verdict
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.runs import result_files, run_files
 from dextron_bench.storage import hashing
+from dextron_bench.storage.run_folder import RunFolder
 from tests.helpers import tiny_benchmark
 
 AGENT = """
@@ -60,7 +61,8 @@ class Forgery:
 
     def table(self, change: Callable[[pd.DataFrame], pd.DataFrame]) -> None:
         """Changes the table of episodes."""
-        run_files.store(self.seed, change(pd.read_parquet(self.seed / run_files.EPISODES)))
+        run = RunFolder(self.seed)
+        run_files.store_episodes(run, change(pd.read_parquet(run.episodes)))
 
     def json(self, name: str, change: Callable[[dict[str, Any]], object]) -> None:
         """Changes a JSON file."""
@@ -70,8 +72,8 @@ class Forgery:
 
     def conclude(self) -> None:
         """Makes the result that of the changed episodes."""
-        told = pd.read_parquet(self.seed / run_files.EPISODES)
-        self.json("seed0/result.json", lambda result: result.update(splits=result_files.scores(told)))
+        told = pd.read_parquet(RunFolder(self.seed).episodes)
+        self.json("seed0/result.json", lambda result: result.update(splits=result_files.scores_by_split(told)))
 
     def checked(self, **how: Any) -> Verdict:
         """What verification finds after all hashes were made right."""

@@ -62,11 +62,11 @@ def test_seeds_that_a_submission_lost_or_won_on_the_board_are_noticed(
     assert main.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
     told = capsys.readouterr().out
     assert "lies in near/synthetic/seed2, but is of near, synthetic reaches, seed 0" in told
-    assert "has seed0, seed1, seed2 where its manifest has seed0, seed1" in told
+    assert "has seed0, seed1, seed2, but its manifest has seed0, seed1" in told
     shutil.rmtree(place / "seed2")
     shutil.rmtree(place / "seed1")
     assert main.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
-    assert "has seed0 where its manifest has seed0, seed1" in capsys.readouterr().out
+    assert "has seed0, but its manifest has seed0, seed1" in capsys.readouterr().out
 
 
 def test_an_addition_that_was_cut_off_is_made_again(submitted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

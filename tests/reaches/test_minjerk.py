@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dextron_bench.experts import policies
-from dextron_bench.reaches.minjerk import LIFT_STEPS, REACH_STEPS, Draw, MinjerkSource, band, carrier, leg
+from dextron_bench.reaches.minjerk import (
+    LIFT_STEPS,
+    REACH_STEPS,
+    Draw,
+    MinjerkSource,
+    band_index,
+    carrier_positions,
+    minimum_jerk_leg,
+)
 from dextron_bench.reaches.reach import ReachError, palm_centre
 from dextron_bench.reaches.setting import Setting, UnknownReach
 from dextron_bench.reaches.sources import open_source
@@ -60,7 +68,7 @@ def test_offsets_and_noise_are_refused(noise: tuple[float, float, float]):
 
 def test_start_via_point_and_top_by_hand():
     draw = Draw(radius=0.5, theta=np.pi / 10, height=0.01)
-    positions = carrier(draw)
+    positions = carrier_positions(draw)
     np.testing.assert_allclose(positions[0], [-0.5 * 0.3090169944, -0.5 * 0.9510565163, 0.1], atol=1e-9)
     np.testing.assert_allclose(positions[250], [-0.045, -0.1, 0.11], atol=1e-5)  # After 5 s.
     np.testing.assert_allclose(positions[-1], [-0.045, -0.1, 0.31], atol=1e-5)
@@ -79,7 +87,7 @@ def test_the_palm_centre_comes_within_the_distance_at_which_experts_close():
 def test_a_leg_is_the_minimum_jerk_polynomial():
     u = np.arange(1, 251) / 250 / 1.01  # The law aims to arrive when its slack has passed too.
     exact = u**3 * (10 - 15 * u + 6 * u**2)
-    found = leg(np.zeros(3), np.array([1.0, 0.0, -2.0]), 250)
+    found = minimum_jerk_leg(np.zeros(3), np.array([1.0, 0.0, -2.0]), 250)
     np.testing.assert_allclose(found[:, 0], exact, atol=0.003)
     np.testing.assert_allclose(found[:, 2], -2.0 * found[:, 0], atol=1e-12)
     assert (np.diff(found[:245, 0]) > 0).all()
@@ -87,14 +95,14 @@ def test_a_leg_is_the_minimum_jerk_polynomial():
 
 @given(st.integers(0, 999_999))
 def test_every_draw_lies_in_its_ranges(number: int):
-    draw = Draw.of(f"minjerk-{number:06d}")
+    draw = Draw.from_name(f"minjerk-{number:06d}")
     assert 0.25 <= draw.radius <= 0.60
     assert np.pi / 14 <= draw.theta <= np.pi / 7
     assert abs(draw.height) <= 0.02
 
 
 def test_draws_are_uniform():
-    draws = np.array([(d.radius, d.theta, d.height) for d in map(Draw.of, MinjerkSource().names)])
+    draws = np.array([(d.radius, d.theta, d.height) for d in map(Draw.from_name, MinjerkSource().names)])
     low, high = np.array([[0.25, np.pi / 14, -0.02], [0.60, np.pi / 7, 0.02]])
     shares = (draws - low) / (high - low)
     np.testing.assert_allclose(shares.mean(axis=0), 0.5, atol=0.03)
@@ -103,17 +111,17 @@ def test_draws_are_uniform():
 
 
 def test_start_regions_go_from_near_to_far_and_from_x_to_y():
-    assert [band(r, 0.25, 0.60) for r in (0.25, 0.33, 0.34, 0.43, 0.52, 0.60)] == [0, 0, 1, 2, 3, 3]
+    assert [band_index(r, 0.25, 0.60) for r in (0.25, 0.33, 0.34, 0.43, 0.52, 0.60)] == [0, 0, 1, 2, 3, 3]
     source = MinjerkSource()
     strata = [source.stratum(name) for name in source.names]
     assert {s.subject for s in strata} == {"minjerk"}
     assert {(s.ring, s.angle) for s in strata} == {(r, a) for r in range(4) for a in range(4)}
-    widest = max(source.names, key=lambda name: Draw.of(name).theta)
+    widest = max(source.names, key=lambda name: Draw.from_name(name).theta)
     assert source.stratum(widest).angle == 0  # Nearest to the -x side.
 
 
 def test_the_papers_expert_lifts_the_bottle():
-    names = [name for name in MinjerkSource().names if abs(Draw.of(name).height) < 0.01][:3]
+    names = [name for name in MinjerkSource().names if abs(Draw.from_name(name).height) < 0.01][:3]
     engine, ids = Engine(len(names), threads=1), np.arange(len(names))
     states = engine.begin(ids, [MinjerkSource().path(at(name)) for name in names])
     first, scores, actions = task.distance(states), np.zeros(len(names)), np.zeros((len(names), 1))
@@ -121,8 +129,8 @@ def test_the_papers_expert_lifts_the_bottle():
     for _ in range(375):
         step = engine.step(ids, actions)
         scores += step.rewards
-        closing = policies.closes(task.distance(step.states), first, critical)
-        actions = policies.law(task.closure(step.states), closing, gain)
+        closing = policies.is_closing(task.distance(step.states), first, critical)
+        actions = policies.closing_speeds(task.closure(step.states), closing, gain)
     assert scores.tolist() == [task.SUCCESS] * 3
 
 

@@ -18,7 +18,7 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.setting import from_frame
 from dextron_bench.runs import execution, result_files
-from dextron_bench.runs.plans import Plan
+from dextron_bench.runs.plans import Plan, resolve
 from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import atomic, provenance
 from dextron_bench.storage.atomic import DamagedFile
@@ -49,7 +49,7 @@ def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def play(folder: Path, plan: Plan = PLAN) -> Path:
-    return execution.execute(plan, folder, threads=1)
+    return execution.execute(resolve(plan), folder, threads=1)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -264,6 +264,11 @@ def test_a_damaged_result_is_named(tmp_path: Path, text: str):
 
 def test_progress_is_told_in_order(tmp_path: Path):
     told = []
-    execution.execute(Plan("nothing", "synthetic", ("test", "open"), 0), tmp_path, 1, lambda *parts: told.append(parts))
+    execution.execute(
+        resolve(Plan("nothing", "synthetic", ("test", "open"), 0)),
+        tmp_path,
+        1,
+        lambda done, total, note="": told.append((done, total)),
+    )
     assert told == [(1, 2), (2, 2), (1, 1)]
     assert not [file for file in os.listdir(tmp_path / "nothing" / "synthetic" / "seed0") if file.endswith(".part")]

@@ -11,11 +11,12 @@ import pandas as pd
 import pytest
 from rerun.chunk import RrdReader
 
-from dextron_bench.runs import execution, rerecording, result_files, run_files, selection
-from dextron_bench.runs.plans import Plan
+from dextron_bench.runs import execution, rerecording, run_files, selection
+from dextron_bench.runs.plans import Plan, resolve
 from dextron_bench.runs.rerecording import Unplayable
 from dextron_bench.runs.selection import EpisodeFilter
 from dextron_bench.storage import atomic
+from dextron_bench.storage.run_folder import RunFolder
 from tests.helpers import tiny_benchmark
 
 ALL = EpisodeFilter(worst=9)
@@ -41,11 +42,13 @@ def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def play(folder: Path, record: int = 0, method: str = "exp") -> Path:
-    return execution.execute(Plan(method, "synthetic", ("val", "test"), seed=2, record=record), folder, threads=1)
+    return execution.execute(
+        resolve(Plan(method, "synthetic", ("val", "test"), seed=2, record=record)), folder, threads=1
+    )
 
 
 def restored(folder: Path, wish: EpisodeFilter = ALL) -> list[Path]:
-    return rerecording.restore(selection.select(selection.episodes([folder]), wish)[0])
+    return rerecording.rerecord(selection.select(selection.episodes([folder]), wish)[0])
 
 
 def digests(files: list[Path]) -> dict[str, str]:
@@ -54,8 +57,8 @@ def digests(files: list[Path]) -> dict[str, str]:
 
 
 def change(folder: Path, **values: Any) -> None:
-    table = pd.read_parquet(folder / run_files.EPISODES)
-    run_files.store(folder, table.assign(**values))
+    table = pd.read_parquet(folder / "episodes.parquet")
+    run_files.store_episodes(RunFolder(folder), table.assign(**values))
 
 
 def test_recordings_made_later_are_those_made_at_once(tmp_path: Path):
@@ -70,7 +73,9 @@ def test_recordings_made_later_are_those_made_at_once(tmp_path: Path):
 def test_what_is_recorded_is_not_made_again(tmp_path: Path):
     folder, told = play(tmp_path, record=1), []
     before = {file.name: file.read_bytes() for file in (folder / "recordings").iterdir()}
-    rerecording.restore(selection.select(selection.episodes([folder]), ALL)[0], lambda *parts: told.append(parts))
+    rerecording.rerecord(
+        selection.select(selection.episodes([folder]), ALL)[0], lambda done, total, note="": told.append((done, total))
+    )
     assert told == [(1, 1)]
     assert {name: (folder / "recordings" / name).read_bytes() for name in before} == before
 
@@ -104,8 +109,8 @@ def test_a_failed_agent_keeps_its_own_reason(tmp_path: Path):
 
 def test_without_actions_only_what_is_recorded_is_there(tmp_path: Path):
     folder = play(tmp_path, record=1)
-    table = pd.read_parquet(folder / run_files.EPISODES)
-    run_files.store(folder, table.drop(columns="actions"))
+    table = pd.read_parquet(folder / "episodes.parquet")
+    run_files.store_episodes(RunFolder(folder), table.drop(columns="actions"))
     assert len(restored(folder, EpisodeFilter(row=(0,)))) == 2
     with pytest.raises(Unplayable) as caught:
         restored(folder)
@@ -115,7 +120,7 @@ def test_without_actions_only_what_is_recorded_is_there(tmp_path: Path):
     (folder / "recordings" / "test-0000.rrd").write_bytes(b"")
     with pytest.raises(Unplayable, match="has a recording that is empty, and its actions were not kept"):
         restored(folder, EpisodeFilter(row=(0,)))
-    (folder / run_files.EPISODES).unlink()  # As the line said.
+    (folder / "episodes.parquet").unlink()  # As the line said.
     assert len(restored(play(tmp_path))) == 3
 
 
@@ -133,7 +138,7 @@ def test_other_physics_and_another_version_of_the_split_are_told(tmp_path: Path)
     change(folder, digest="0" * 64)
     with pytest.raises(Unplayable, match="is of a version of the split that is no more"):
         restored(folder)
-    config = folder / run_files.CONFIG
+    config = folder / "config.json"
     config.write_text(json.dumps(json.loads(config.read_text()) | {"physics": "other"}))
     with pytest.raises(Unplayable, match="was played with other physics than this version's; remove"):
         restored(folder)
@@ -141,9 +146,9 @@ def test_other_physics_and_another_version_of_the_split_are_told(tmp_path: Path)
 
 def test_a_run_under_way_is_called_after_its_folder(tmp_path: Path):
     folder = play(tmp_path)
-    assert selection.run_identity(folder) == {"method": "exp", "reaches": "synthetic", "seed": 2}
-    (folder / result_files.RESULT).unlink()
-    assert selection.run_identity(folder) == {"method": "exp", "reaches": "synthetic", "seed": 2}
-    (folder / run_files.CONFIG).write_text("{}")
+    assert selection.run_identity(RunFolder(folder)) == {"method": "exp", "reaches": "synthetic", "seed": 2}
+    (folder / "result.json").unlink()
+    assert selection.run_identity(RunFolder(folder)) == {"method": "exp", "reaches": "synthetic", "seed": 2}
+    (folder / "config.json").write_text("{}")
     with pytest.raises(atomic.DamagedFile, match="it lacks 'reaches'"):
-        selection.run_identity(folder)
+        selection.run_identity(RunFolder(folder))

@@ -26,7 +26,7 @@ WEIGHTS = sorted((Path(baselines.__file__).parent / "weights").glob("*/*/seed*.s
 
 def name(file: Path) -> str:
     """Method, source of reaches and seed of a file, as a folder of runs has them."""
-    return "/".join([*file.parts[-4:-1]] if file.name == result_files.RESULT else [*file.parts[-3:-1], file.stem])
+    return "/".join([*file.parts[-4:-1]] if file.name == "result.json" else [*file.parts[-3:-1], file.stem])
 
 
 @pytest.mark.parametrize("file", RESULTS, ids=name)
@@ -53,9 +53,9 @@ def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
 
 @pytest.mark.parametrize("file", WEIGHTS, ids=name)
 def test_weights_that_ship_are_those_of_the_result(file: Path):
-    result = result_files.read_result(BOARD / "results" / name(file) / result_files.RESULT)
-    assert result["training"].items() >= weights.about(file).items()
-    points = atomic.read_json(BOARD / "results" / name(file) / jobs.CURVE)["points"]
+    result = result_files.read_result(BOARD / "results" / name(file) / "result.json")
+    assert result["training"].items() >= weights.metadata(file).items()
+    points = atomic.read_json(BOARD / "results" / name(file) / "curve.json")["points"]
     assert result["training"]["best_epoch"] in [point["epoch"] for point in points]
 
 
@@ -72,7 +72,7 @@ def test_weights_that_ship_score_what_was_published(file: Path, rows: int, opene
     learner = registry.create(about["method"], about["settings"])
     assert isinstance(learner, Learner)
     split = load_split(reaches, "test")
-    agent, source = weights.agent(learner, file), opened(reaches)
+    agent, source = weights.load_agent(learner, file), opened(reaches)
     found = {index: each.score for index, each in rollout(agent, source, split.cases[:rows])}
-    result = result_files.read_result(BOARD / "results" / name(file) / result_files.RESULT)
+    result = result_files.read_result(BOARD / "results" / name(file) / "result.json")
     assert [found[row] for row in range(rows)] == result["splits"]["test"]["scores"][:rows]

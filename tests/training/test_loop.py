@@ -140,7 +140,7 @@ def test_a_training_depends_on_journal_and_streams(tmp_path: Path, monkeypatch: 
 
 def test_of_equal_snapshots_the_later_is_the_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(learning_curve, "FINALISTS", 2)
-    monkeypatch.setattr(learning_curve, "CURVE", 1)
+    monkeypatch.setattr(learning_curve, "POINT_ROWS", 1)
     monkeypatch.setitem(globals(), "load_split", lambda *_, load=load_split: load("synthetic", "test"))
     done = train(tmp_path / "a", Toy(every=1, preset="quick"))
     made = learning_curve.Curve(QUICK, done, tiny_benchmark.SOURCE, load_split("synthetic", "val"))
@@ -151,6 +151,7 @@ def test_of_equal_snapshots_the_later_is_the_best(tmp_path: Path, monkeypatch: p
         write_scores(done, epoch, 2, finals.get(epoch, [0.0, 0.0]))
     assert made.best(0) == 4  # 1 would be better on all of `val`, but 3 and 4 are the finalists.
     write_scores(done, 3, 2, [9.0, 6.0])
+    made = learning_curve.Curve(QUICK, done, tiny_benchmark.SOURCE, load_split("synthetic", "val"))
     assert made.best(0) == 3
     assert made.points(0)[1] == {"epoch": 2, "return": 4.0, "success": 0.0}
 

@@ -18,6 +18,7 @@ import jsonschema
 from jsonschema.exceptions import best_match
 
 from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage.run_folder import RunFolder
 
 FORMAT = 1
 MANIFEST = "bundle.json"
@@ -41,7 +42,7 @@ class BadBundle(ValueError):
 
 def pack(folder: Path, told: Mapping[str, Any], agent: Mapping[str, Path], file: Path) -> dict[str, Any]:
     """Writes the runs `seed<k>` in a folder and an agent's own files, by name, as a bundle; returns its manifest."""
-    found = [file for seed in told["seeds"] for file in sorted((folder / f"seed{seed}").rglob("*"))]
+    found = [file for seed in told["seeds"] for file in sorted(RunFolder.of_seed(folder, seed).path.rglob("*"))]
     parts = {name: file for file in found if MEMBER.fullmatch(name := str(file.relative_to(folder)))}
     check_agent(agent)
     parts |= {f"agent/{name}": found for name, found in agent.items()}

@@ -11,7 +11,7 @@ from dextron_bench.runs import result_files
 MANY = 0.5  # The share of equal episodes from which a submission counts as another's.
 
 
-def found(results: Mapping[int, dict[str, Any]], name: str, board: Path) -> Iterator[str]:
+def copied_seeds(results: Mapping[int, dict[str, Any]], name: str, board: Path) -> Iterator[str]:
     """A line for each seed of results most of whose episodes on a split are those of another name's on the board."""
     for other in result_files.results(board / "results"):
         if other["method"] == name:

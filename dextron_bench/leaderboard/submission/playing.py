@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +12,15 @@ import pandas as pd
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.leaderboard.submission import bundle
 from dextron_bench.leaderboard.submission.entry import Entry
-from dextron_bench.methods.isolation.isolated_agent import Isolated, Limits
+from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent, Limits
 from dextron_bench.methods.isolation.launch import Launch
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import Source
-from dextron_bench.runs import execution, result_files, run_files
+from dextron_bench.runs import execution, result_files
 from dextron_bench.splits.loading import Split, load_split, ranking_splits
-from dextron_bench.storage import hashing
-
-Report = Callable[[int, int, str], None]  # Told (episodes done, all of a split, which seed).
+from dextron_bench.storage import folder_config, hashing
+from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.run_folder import RunFolder
 
 
 def compete(
@@ -29,7 +29,7 @@ def compete(
     record: int,
     limits: Limits,
     threads: int = 0,
-    report: Report = lambda *_: None,
+    report: Progress = no_progress,
 ) -> Path:
     """Plays all that an entry needs and the folder of runs lacks; returns the folder of its seeds.
 
@@ -41,18 +41,18 @@ def compete(
     bundle.check_agent(entry.files())
     wanted = [load_split(entry.reaches, name) for name in ranking_splits(entry.reaches)]
     for seed in entry.seeds:
-        place = folder / f"seed{seed}"
-        run_files.claim(place, _config(entry, seed))
+        run = RunFolder.of_seed(folder, seed)
+        folder_config.write_or_check(run.path, _config(entry, seed))
         about = {"method": entry.name, "reaches": entry.reaches, "seed": seed}
 
         def play(split: Split, seed: int = seed) -> execution.Played:
             return shuffled(entry.launch, source, split, seed, limits, threads)
 
-        def told(done: int, total: int, seed: int = seed) -> None:
+        def report_seed(done: int, total: int, note: str = "", seed: int = seed) -> None:
             report(done, total, f"seed {seed}")
 
-        episodes = execution.evaluate(place, source, wanted, play, record, about, told)
-        result_files.conclude(place, episodes, about)
+        table = execution.evaluate(run, source, wanted, play, record, about, report_seed)
+        result_files.write_result(run, table, about)
     return folder
 
 
@@ -61,7 +61,7 @@ def shuffled(
 ) -> Iterator[tuple[int, Any]]:
     """Rows of a split and their episodes, played by an agent in a process of its own in the order of `order`."""
     rows = order(split, seed)
-    with Isolated(how, seed, limits) as agent:
+    with IsolatedAgent(how, seed, limits) as agent:
         for place, episode in rollout(agent, source, [split.cases[row] for row in rows], threads=threads):
             yield int(rows[place]), episode
 
@@ -74,7 +74,7 @@ def order(split: Split, seed: int) -> np.ndarray:
 
 def failures(folder: Path, seeds: Sequence[int]) -> dict[str, int]:
     """What failed episodes failed of, and how many did."""
-    tables = [pd.read_parquet(folder / f"seed{seed}" / run_files.EPISODES, columns=["failure"]) for seed in seeds]
+    tables = [pd.read_parquet(RunFolder.of_seed(folder, seed).episodes, columns=["failure"]) for seed in seeds]
     told = pd.concat(tables)["failure"].str.replace(r" at step \d+$", "", regex=True)
     return {str(why): int(count) for why, count in told[told != ""].value_counts().items()}
 

@@ -1,4 +1,4 @@
-"""Episodes played again from a split's settings and a table's actions, and held against what the table says."""
+"""Plays episodes again from a split's settings and a table's actions, and compares them with the table."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
+from dextron_bench.storage.progress import Progress, no_progress
 
 TOLERANCE = 1e-3  # How far a number of the last state may be off on another platform.
 AGREEING = 0.99  # The share of episodes that must end alike there.
@@ -23,8 +24,7 @@ WORDS = {
     "trace": "hash of states, actions and rewards",
 }  # fmt: skip
 
-Report = Callable[[int, int], None]  # Told (episodes done, all).
-Look = Callable[[str, int, Episode], None]  # Shown each (split, row, episode) as it was played again.
+Observe = Callable[[str, int, Episode], None]  # Receives (split, row, episode) of each episode that was played again.
 
 
 @dataclass(slots=True)
@@ -38,54 +38,58 @@ class Replayed:
     differing: list[str] = field(default_factory=list)  # A line for each episode that is not exact.
 
 
-def again(
+def replay_table(
     source: Source,
-    wanted: Sequence[Split],
+    splits: Sequence[Split],
     table: pd.DataFrame,
     threads: int = 0,
-    report: Report = lambda done, total: None,
-    look: Look = lambda split, row, episode: None,
+    report: Progress = no_progress,
+    observe: Observe = lambda split, row, episode: None,
 ) -> Replayed:
-    """Plays a whole table again; its rows are those of the splits (see `tables.faults`)."""
-    made, found = [], Replayed(pd.DataFrame())
-    for split, row, told, episode in _played(source, wanted, table, threads):
-        look(split.name, row, episode)
-        new = episode_table.row(split, row, episode)
-        made.append(new)
-        found.episodes += 1
-        other = [name for name in EXACT if not _equal(new[name], told[name])]
-        found.exact += not other
-        found.alike += _alike(new, told)
+    """Plays a whole table again; its rows are rows of the splits (see `episode_tables.faults`)."""
+    rows, replayed = [], Replayed(pd.DataFrame())
+    for split, row, claimed, episode in _played(source, splits, table, threads):
+        observe(split.name, row, episode)
+        computed = episode_table.row(split, row, episode)
+        rows.append(computed)
+        replayed.episodes += 1
+        other = [name for name in EXACT if not _equal(computed[name], claimed[name])]
+        replayed.exact += not other
+        replayed.alike += _alike(computed, claimed)
         if other:
-            found.differing.append(f"{split.name} row {row}: {_said(other[0], told, new)}")
-        report(found.episodes, len(table))
-    found.rows = pd.DataFrame(made).sort_values(["split", "row"], ignore_index=True)
-    return found
+            replayed.differing.append(f"{split.name} row {row}: {_difference(other[0], claimed, computed)}")
+        report(replayed.episodes, len(table))
+    replayed.rows = pd.DataFrame(rows).sort_values(["split", "row"], ignore_index=True)
+    return replayed
 
 
 def _played(
-    source: Source, wanted: Sequence[Split], table: pd.DataFrame, threads: int
+    source: Source, splits: Sequence[Split], table: pd.DataFrame, threads: int
 ) -> Iterator[tuple[Split, int, dict[str, Any], Episode]]:
-    for split in wanted:
+    """Each split and row with the claims of the table and the episode as it was played again."""
+    for split in splits:
         rows = table[table["split"] == split.name].sort_values("row").to_dict("records")
         settings = [split.cases[row["row"]].setting for row in rows]
         for place, episode in replay(source, settings, [np.asarray(row["actions"], float) for row in rows], threads):
-            told = {str(name): value for name, value in rows[place].items()}
-            if told["failure"] and episode.failure:  # Its agent failed where its actions end.
-                episode = replace(episode, failure=told["failure"])
-            yield split, told["row"], told, episode
+            claimed = {str(name): value for name, value in rows[place].items()}
+            if claimed["failure"] and episode.failure:  # Its agent failed where its actions end.
+                episode = replace(episode, failure=claimed["failure"])
+            yield split, claimed["row"], claimed, episode
 
 
-def _equal(new: Any, told: Any) -> bool:
-    return bool(new == told or (new != new and told != told))
+def _equal(computed: Any, claimed: Any) -> bool:
+    """True if two values are equal; NaN equals NaN."""
+    return bool(computed == claimed or (computed != computed and claimed != claimed))
 
 
-def _alike(new: dict[str, Any], told: dict[str, Any]) -> bool:
-    same = all(_equal(new[name], told[name]) for name in ("success", "length", "failure"))
-    return same and bool(np.abs(np.asarray(new["final"]) - np.asarray(told["final"], float)).max() <= TOLERANCE)
+def _alike(computed: dict[str, Any], claimed: dict[str, Any]) -> bool:
+    """True if two episodes end alike."""
+    same = all(_equal(computed[name], claimed[name]) for name in ("success", "length", "failure"))
+    distance = np.abs(np.asarray(computed["final"]) - np.asarray(claimed["final"], float)).max()
+    return same and bool(distance <= TOLERANCE)
 
 
-def _said(name: str, told: dict[str, Any], new: dict[str, Any]) -> str:
+def _difference(name: str, claimed: dict[str, Any], computed: dict[str, Any]) -> str:
     if name == "trace":
-        return f"the {WORDS[name]} is another than that of its actions played again"
-    return f"says {WORDS.get(name, name)} {told[name]}; played again it is {new[name]}"
+        return f"its {WORDS[name]} differs from the hash of its actions played again"
+    return f"says {WORDS.get(name, name)} {claimed[name]}; played again it is {computed[name]}"

@@ -6,9 +6,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from dextron_bench.leaderboard.submission import bundle, entry, episode_tables
-from dextron_bench.runs import run_files
 from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import hashing
+from dextron_bench.storage.run_folder import seed_folders
 
 FOLDER = Path(entry.FOLDER, ".bundles")  # In the folder of runs; no submission can be called so.
 
@@ -29,8 +29,8 @@ def opened(file: Path, runs: Path) -> Path:
         part = Path(folder) / "bundle"
         manifest = bundle.unpack(file, part)
         wanted = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
-        for table in part.glob(f"seed*/{run_files.EPISODES}"):
-            for fault in episode_tables.faults(episode_tables.read(table, wanted), wanted):
-                raise bundle.BadBundle(f"{file}: {table.parent.name}: {fault}")
+        for run in seed_folders(part):
+            for fault in episode_tables.faults(episode_tables.read(run.episodes, wanted), wanted):
+                raise bundle.BadBundle(f"{file}: {run.path.name}: {fault}")
         part.replace(place)
     return place

@@ -7,7 +7,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from dextron_bench.runs import run_files
 from tests.helpers.forged_bundles import Forgery, row
 
 
@@ -32,7 +31,7 @@ def test_forms_that_no_run_writes_are_refused(change, why: str, forged: Forgery)
 
 
 def test_two_columns_of_a_name_are_refused(forged: Forgery):
-    file = forged.seed / run_files.EPISODES
+    file = forged.seed / "episodes.parquet"
     table = pq.read_table(file)
     twice = pa.Table.from_arrays([*table.columns, table.column("split")], names=[*table.column_names, "split"])
     pq.write_table(twice, file)
@@ -40,14 +39,14 @@ def test_two_columns_of_a_name_are_refused(forged: Forgery):
 
 
 def test_more_row_groups_than_a_run_writes_are_refused(forged: Forgery, monkeypatch: pytest.MonkeyPatch):
-    file = forged.seed / run_files.EPISODES
+    file = forged.seed / "episodes.parquet"
     monkeypatch.setattr("dextron_bench.leaderboard.submission.episode_tables.GROUPS", 3)
     pq.write_table(pq.read_table(file), file, row_group_size=1)
     assert "has 4 row groups; 3 are plenty" in forged.checked().problems[0]
 
 
 def test_what_is_no_table_is_refused(forged: Forgery):
-    (forged.seed / run_files.EPISODES).write_bytes(b"PAR1 nothing PAR1")
+    (forged.seed / "episodes.parquet").write_bytes(b"PAR1 nothing PAR1")
     assert "is no table that can be read" in forged.checked().problems[0]
 
 

@@ -16,7 +16,6 @@ from dextron_bench.leaderboard.submission import entry as submission_entry
 from dextron_bench.leaderboard.submission import playing, result_check
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.reaches import sources
-from dextron_bench.runs import run_files
 from dextron_bench.splits.loading import Split, cases_from_frame
 from dextron_bench.storage import provenance
 from tests.helpers import tiny_benchmark
@@ -61,12 +60,12 @@ def test_a_changed_reward_is_caught(forged: Forgery):
 
 
 def test_a_changed_action_is_caught(forged: Forgery):
-    told = pd.read_parquet(forged.seed / run_files.EPISODES).query("split == 'test' and row == 0")
+    told = pd.read_parquet(forged.seed / "episodes.parquet").query("split == 'test' and row == 0")
     actions = np.array(told["actions"].iloc[0])
     actions[-1] = np.nextafter(actions[-1], 0.0)
     forged.table(row(0, actions=actions))
     forged.conclude()
-    assert "hash of states, actions and rewards is another" in "".join(forged.checked().problems)
+    assert "its hash of states, actions and rewards differs" in "".join(forged.checked().problems)
 
 
 def test_actions_that_are_none_or_too_few_are_caught(forged: Forgery):
@@ -180,7 +179,7 @@ def test_chosen_and_hidden_seeds_are_caught(forged: Forgery):
     forged.json("bundle.json", lambda told: told.update(seeds=[1]))
     problems = forged.checked().problems
     assert "has seeds [1]; they must be 0, 1, 2" in problems[0]
-    assert "seed0 is there, but not among the seeds" in problems[1]
+    assert "holds seed0, which is not among the seeds" in problems[1]
     forged.json("bundle.json", lambda told: told.update(seeds=[0, 1, 2]))
     assert "seed2: lacks episodes.parquet" in forged.checked().problems[0]
 

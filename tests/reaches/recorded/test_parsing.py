@@ -52,13 +52,13 @@ def test_a_sample_sent_twice_is_one(small_release: SmallRelease):
     ("name", "origin"), [("01_fl_01", ("01", 0, 0)), ("09_nr_04", ("09", 0, 3)), ("02_fr_13", ("02", 3, 0))]
 )
 def test_markers_run_along_angles_within_a_ring(name: str, origin: tuple[str, int, int]):
-    assert parsing.origin(name) == origin
+    assert parsing.subject_and_region(name) == origin
 
 
 @pytest.mark.parametrize("name", ["01_fl_17", "01_fl_00", "1_fl_01", "01_xx_01", "../01_fl_01", ""])
 def test_other_names_are_refused(name: str):
-    with pytest.raises(parsing.RawError, match="SUBJECT_TRIAL_MARKER"):
-        parsing.origin(name)
+    with pytest.raises(parsing.RecordingError, match="SUBJECT_TRIAL_MARKER"):
+        parsing.subject_and_region(name)
 
 
 @pytest.mark.parametrize(
@@ -73,26 +73,26 @@ def test_other_names_are_refused(name: str):
         (line(t=True), "'t' holds a bool, not a number"),
         (line(x=[0.0, "1", 0.0]), "'x' holds a str, not a number"),
         ('{"t": 1.0, "x": [0.0, 0.0, 0.0]}', "'q' is missing"),
-        (line()[:-4], "is not JSON, or is cut short"),
-        ("", "is not JSON, or is cut short"),
+        (line()[:-4], "is not JSON, or is truncated"),
+        ("", "is not JSON, or is truncated"),
         ("[1]", "is not an object with t, x and q"),
-        ("[" * 5000, "is not JSON, or is cut short"),
+        ("[" * 5000, "is not JSON, or is truncated"),
     ],
 )
 def test_a_bad_sample_is_named_by_line(second: str, wrong: str):
-    with pytest.raises(parsing.RawError) as caught:
+    with pytest.raises(parsing.RecordingError) as caught:
         parsing.read_samples(FILE, f"{line()}\n{second}\n{line(t=2.0)}\n".encode())
     assert str(caught.value).startswith(f"{FILE}: line 2: ")
     assert wrong in str(caught.value)
 
 
 def test_bytes_that_are_no_text_are_named_by_line():
-    with pytest.raises(parsing.RawError, match="line 2: is not UTF-8"):
+    with pytest.raises(parsing.RecordingError, match="line 2: is not UTF-8"):
         parsing.read_samples(FILE, line().encode() + b"\n\xff\xfe\n")
 
 
 def test_an_empty_file_is_an_error():
-    with pytest.raises(parsing.RawError, match="line 1: the file is empty"):
+    with pytest.raises(parsing.RecordingError, match="line 1: the file is empty"):
         parsing.read_samples(FILE, b"")
 
 
@@ -100,14 +100,14 @@ def test_an_empty_file_is_an_error():
     ("notes", "wrong"),
     [
         (GOOD[:2], "annotation 'top' is missing"),
-        ([GOOD[0], *GOOD], "annotation 'start' is there twice"),
+        ([GOOD[0], *GOOD], "annotation 'start' occurs twice"),
         ([["start", None], *GOOD[1:]], "'start' holds a NoneType, not a number"),
         ([["start"], *GOOD[1:]], r"entry 1 is not \[name, seconds\]"),
         ({"start": 0.0}, "is not a list"),
     ],
 )
 def test_bad_annotations_are_named(notes: Any, wrong: str):
-    with pytest.raises(parsing.RawError, match=f"{NOTES}: line 1: .*{wrong}"):
+    with pytest.raises(parsing.RecordingError, match=f"{NOTES}: line 1: .*{wrong}"):
         parsing.read_annotations(NOTES, json.dumps(notes).encode())
 
 
@@ -118,13 +118,13 @@ def test_a_later_rest_may_be_there_twice():
 
 def test_reached_outside_the_recording_is_an_error(small_release: SmallRelease):
     notes = json.dumps([["start", START], ["reached", START + 0.6], ["top", START + 0.7]]).encode()
-    with pytest.raises(parsing.RawError, match=r"'reached' is outside the recording, 0\.600 s"):
+    with pytest.raises(parsing.RecordingError, match=r"'reached' is outside the recording, 0\.600 s"):
         parsing.parse("01_fl_06", small_release.files[FILE], notes)
 
 
 def test_too_few_samples_are_an_error(small_release: SmallRelease):
     three = b"".join(small_release.files[FILE].splitlines(keepends=True)[:3])
-    with pytest.raises(parsing.RawError, match="has 3 samples"):
+    with pytest.raises(parsing.RecordingError, match="has 3 samples"):
         parsing.parse("01_fl_06", three, small_release.files[NOTES])
 
 
@@ -168,9 +168,9 @@ def test_any_annotations_are_refused_or_sound(text: str):
 
 @contextmanager
 def suppressed_at(place: str) -> Iterator[None]:
-    """Lets a RawError pass that begins with a place; any other error is a failure."""
+    """Lets a RecordingError pass that begins with a place; any other error is a failure."""
     try:
         yield
-    except parsing.RawError as error:
+    except parsing.RecordingError as error:
         if not str(error).startswith(place):
             raise

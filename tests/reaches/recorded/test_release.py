@@ -75,7 +75,7 @@ def test_a_missing_file_is_named(small_release: SmallRelease):
 def test_a_file_that_is_no_zip_or_a_cut_one_is_refused(small_release: SmallRelease):
     whole = small_release.zip()
     whole.write_bytes(whole.read_bytes()[:-40])
-    assert "is not a sound zip file" in refused(whole, small_release)
+    assert "is not a valid zip file" in refused(whole, small_release)
 
 
 def test_bytes_damaged_inside_the_zip_are_named(small_release: SmallRelease):

@@ -1,0 +1,120 @@
+"""Verifies a baseline's row of the board: runs its code with the weights that ship again, and compares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from dextron_bench.evaluation import episode_table
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.methods import registry, weights
+from dextron_bench.methods.agents import Agent, AgentError
+from dextron_bench.reaches import sources
+from dextron_bench.runs import execution, result_files
+from dextron_bench.runs.plans import Plan, resolve, with_shipped_weights
+from dextron_bench.splits.loading import Split, load_split, ranking_splits
+from dextron_bench.storage.progress import Progress
+from dextron_bench.storage.run_folder import RunFolder
+
+
+class NotReproducible(LookupError):
+    """A row whose agent cannot be made again."""
+
+
+@dataclass(slots=True)
+class Finding:
+    """What verification finds for a row: what was done, and problems, none if its episodes give what it says.
+
+    `actions` are hashes of the actions on every split, if a baseline ran again on all rows.
+    """
+
+    done: str
+    problems: list[str] = field(default_factory=list)
+    actions: dict[str, list[str]] = field(default_factory=dict)
+
+
+def rerun(run: RunFolder, result: dict[str, Any], count: int, threads: int, report: Progress) -> Finding:
+    """Runs a row's agent again on `count` rows of each split, drawn at random; 0 takes all."""
+    finding, done = Finding(""), 0
+    total = sum(len(split["scores"]) for split in result["splits"].values())
+    try:
+        if missing := set(ranking_splits(result["reaches"])) - result["splits"].keys():
+            finding.problems.append(f"lacks {', '.join(sorted(missing))}")
+        for name, claimed in result["splits"].items():
+            split = load_split(result["reaches"], name)
+            if fault := _fault(claimed, split):
+                finding.problems.append(fault)
+                continue
+            done += _rerun_split(run, result, split, _rows(len(split.cases), count), threads, finding)
+            report(done, total)
+    except (NotReproducible, weights.MissingWeights, AgentError) as error:
+        finding.problems.append(str(error))
+    finding.done = f"run again, {done} of {total} episodes, all equal"
+    return finding
+
+
+def _fault(claimed: dict[str, Any], split: Split) -> str:
+    """What is wrong with the form of a split's scores; empty if they can be compared."""
+    if split.digest != claimed["digest"]:
+        return f"{split.name} is of another version of the split"
+    if {len(claimed[name]) for name in ("scores", "actions") if name in claimed} != {len(split.cases)}:
+        return f"{split.name} has not one score and one hash of actions for each row of the split"
+    return ""
+
+
+def _rerun_split(
+    run: RunFolder, result: dict[str, Any], split: Split, rows: np.ndarray, threads: int, finding: Finding
+) -> int:
+    """Runs the agent on rows of a split and adds the differences; returns how many rows it played in the end."""
+    source, cases = sources.open_source(split.reaches), [split.cases[row] for row in rows]
+    episodes = dict(rollout(_agent(run, result), source, cases, threads=threads))
+    table = pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
+    computed, whole = result_files.scores_by_split(table)[split.name], len(rows) == len(split.cases)
+    differences = list(_differences(result["splits"][split.name], computed, rows, whole))
+    if differences and not whole:  # An agent may draw numbers in an order that depends on the other episodes.
+        return _rerun_split(run, result, split, np.arange(len(split.cases)), threads, finding)
+    finding.problems += [f"{split.name} {difference}" for difference in differences]
+    if whole:
+        finding.actions[split.name] = computed["actions"]
+    return len(rows)
+
+
+def _differences(claimed: dict[str, Any], computed: dict[str, Any], rows: np.ndarray, whole: bool) -> Iterator[str]:
+    """How the scores of a split differ from those computed on some of its rows, or on the whole."""
+    for place, row in enumerate(rows):
+        if claimed["scores"][row] != computed["scores"][place]:
+            yield f"row {row}: says return {claimed['scores'][row]:g}; run again it is {computed['scores'][place]:g}"
+        elif "actions" in claimed and claimed["actions"][row] != computed["actions"][place]:
+            yield f"row {row}: says other actions than those of the agent, run again"
+    for name in ("failed", "causes", "closing_lag") if whole else ():
+        if claimed[name] != computed[name]:
+            yield f"says {name.replace('_', ' ')} {claimed[name]}; run again it is {computed[name]}"
+
+
+def _rows(total: int, count: int) -> np.ndarray:
+    """All row numbers, or `count` drawn at random, in order: nobody can know which rows are verified."""
+    if not 0 < count < total:
+        return np.arange(total)
+    return np.sort(np.random.default_rng().choice(total, count, replace=False))
+
+
+def _agent(run: RunFolder, result: dict[str, Any]) -> Agent:
+    """The agent of a row, from the code and the weights that ship; raises NotReproducible and others."""
+    maker, seed = result.get("maker", {}), result["seed"]
+    if maker.get("method") not in registry.installed_methods():
+        raise NotReproducible("has neither its episodes nor a method that ships")
+    made = resolve(Plan(maker["method"], result["reaches"], seed=seed, settings=maker["settings"]))
+    claimed = RunFolder.of(run.path.parents[2], result["method"], result["reaches"], seed)
+    if run.identity != claimed.identity or (result["method"], result["reaches"]) != (made.label, made.source):
+        raise NotReproducible(f"lies in {run.identity}, but was made by {made.label} on {made.source} reaches")
+    if made.learner is not None:
+        made = with_shipped_weights(made, [seed])[0]
+        assert made.plan.weights
+        facts = weights.metadata(made.plan.weights)
+        if other := [name for name in ("sha256", *facts) if result["training"].get(name) != facts[name]]:
+            raise NotReproducible(f"was made with other weights than those that ship: its {other[0]} differs")
+    return execution.agent(made, made.plan.weights)

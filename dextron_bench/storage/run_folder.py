@@ -1,0 +1,108 @@
+"""The folder of a run, `<runs>/<label>/<reaches>/seed<k>`, and every path in it.
+
+It stands at the bottom of the layers because training, runs and the leaderboard all read and write run folders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+SEED = "seed"  # The folder of seed 3 is `seed3`.
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class RunFolder:
+    """The folder of one method, one source of reaches and one seed."""
+
+    path: Path
+
+    @classmethod
+    def of(cls, runs: Path, label: str, reaches: str, seed: int) -> RunFolder:
+        """The folder of a run below the folder of all runs."""
+        return cls.of_seed(source_folder(runs, label, reaches), seed)
+
+    @classmethod
+    def of_seed(cls, parent: Path, seed: int) -> RunFolder:
+        """The folder of a seed, below the folder of a method's runs on one source, or of a bundle."""
+        return cls(parent / f"{SEED}{seed}")
+
+    @property
+    def identity(self) -> str:
+        """Label, source of reaches and seed as the path has them, such as `rlil-0.1/real/seed0`."""
+        return "/".join(self.path.resolve().parts[-3:])
+
+    @property
+    def label(self) -> str:
+        """The label of the method, as the path has it."""
+        return self.path.resolve().parts[-3]
+
+    @property
+    def seed(self) -> int:
+        """The seed, as the path has it."""
+        return int(self.path.name.removeprefix(SEED))
+
+    @property
+    def config(self) -> Path:
+        """What the run depends on."""
+        return self.path / "config.json"
+
+    @property
+    def provenance(self) -> Path:
+        """The code, versions and machine of the run."""
+        return self.path / "provenance.json"
+
+    @property
+    def weights(self) -> Path:
+        """The weights that the agent acts with, if its method learns."""
+        return self.path / "weights.safetensors"
+
+    @property
+    def curve(self) -> Path:
+        """The learning curve, if the method learns."""
+        return self.path / "curve.json"
+
+    @property
+    def episodes(self) -> Path:
+        """The table of episodes."""
+        return self.path / "episodes.parquet"
+
+    @property
+    def result(self) -> Path:
+        """The scores of all episodes, from which the leaderboard is computed."""
+        return self.path / "result.json"
+
+    @property
+    def recordings(self) -> Path:
+        """The folder of recordings."""
+        return self.path / "recordings"
+
+    @property
+    def manifest(self) -> Path:
+        """The SHA-256 of every recording."""
+        return self.path / "recordings.json"
+
+    def recording(self, split: str, row: int) -> Path:
+        """The recording of a split's row."""
+        return self.recordings / f"{split}-{row:04d}.rrd"
+
+
+def source_folder(runs: Path, label: str, reaches: str) -> Path:
+    """The folder of a method's runs on one source of reaches."""
+    return runs / label / reaches
+
+
+def run_folders(runs: Path, label: str = "*") -> list[RunFolder]:
+    """All run folders below a folder of runs, sorted; `label` selects one method."""
+    return sorted(RunFolder(path) for path in runs.glob(f"{label}/*/{SEED}*"))
+
+
+def seed_folders(parent: Path) -> list[RunFolder]:
+    """The run folders of all seeds in a folder, sorted."""
+    return sorted(RunFolder(path) for path in parent.glob(f"{SEED}*"))
+
+
+def below(place: Path, name: str) -> Iterator[RunFolder]:
+    """Run folders at or below a place that hold a file of this name, sorted."""
+    return (RunFolder(file.parent) for file in sorted(place.glob(f"**/{name}")))

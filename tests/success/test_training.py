@@ -1,0 +1,82 @@
+"""Training of the success model: the same bytes after a stop, the best epoch, and what it learns."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dextron_bench.storage import folder_config, tensors
+from dextron_bench.success.generation import block_file
+from dextron_bench.success.training import MODEL, STATE, BadTrainingConfig, TrainingConfig, train
+from tests.success.test_dataset import write_block
+from tests.success.test_generation import file_contents
+
+SHORT = TrainingConfig(epochs=2, updates=3, batch=8)
+
+
+def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
+    for folder in ("a", "b", "c"):
+        write_block(tmp_path / folder, 0, [30] * 10, [0, 1] * 5)
+    train(tmp_path / "a", SHORT)
+    train(tmp_path / "c", replace(SHORT, epochs=1))
+    train(tmp_path / "c", SHORT)
+    assert file_contents(tmp_path / "a") == file_contents(tmp_path / "c")
+    with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
+        train(tmp_path / "c", replace(SHORT, epochs=1))
+
+    def stop(done: int, total: int, note: str = "") -> None:
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(tmp_path / "b", SHORT, stop)
+    train(tmp_path / "b", SHORT)
+    assert file_contents(tmp_path / "a") == file_contents(tmp_path / "b")
+    about = tensors.read_about(tmp_path / "a" / MODEL)
+    assert [point["epoch"] for point in about["curve"]] == [1, 2]
+    losses = [point["test_loss"] for point in about["curve"]]
+    assert losses[about["best_epoch"] - 1] == min(losses)
+    with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
+        train(tmp_path / "a", TrainingConfig(epochs=2, updates=4, batch=8))
+    with pytest.raises(BadTrainingConfig, match="above 0"):
+        TrainingConfig(updates=0)
+    with pytest.raises(BadTrainingConfig, match="0 or more, not -1"):
+        TrainingConfig(seed=-1)
+    shutil.copyfile(tmp_path / "a" / MODEL, tmp_path / "a" / STATE)
+    with pytest.raises(tensors.BadTensors, match=r"fit\.safetensors .*not an unfinished training"):
+        train(tmp_path / "a", SHORT)
+
+
+def test_the_model_is_from_the_epoch_with_the_lowest_held_out_loss(tmp_path: Path):
+    """Outcomes are random and episodes are few, so every epoch makes the predictions on held-out episodes worse."""
+    rng = np.random.default_rng(1)
+    arrays = {"states": rng.normal(size=(60, 48)).astype(np.float32), "actions": np.zeros(60, np.float32)}
+    arrays |= {"starts": np.arange(61), "solved": rng.integers(0, 2, 60).astype(np.uint8)}
+    tensors.write(block_file(tmp_path, 0), arrays, {})
+    long, short = (TrainingConfig(epochs=epochs, updates=20, batch=32) for epochs in (4, 1))
+    train(tmp_path, long)
+    assert tensors.read_about(tmp_path / MODEL)["best_epoch"] == 1
+    best = tensors.read(tmp_path / MODEL)
+    (tmp_path / STATE).unlink()
+    train(tmp_path, short)
+    for name, array in tensors.read(tmp_path / MODEL).items():
+        np.testing.assert_array_equal(array, best[name])
+
+
+def test_training_learns_an_outcome_that_depends_on_the_state(tmp_path: Path):
+    """Success depends on the sign of one number of the state, so the model predicts almost all outcomes correctly."""
+    rng = np.random.default_rng(0)
+    states = rng.normal(size=(3000, 48)).astype(np.float32)
+    arrays = {"states": states, "actions": rng.uniform(-1, 1, 3000).astype(np.float32), "starts": np.arange(3001)}
+    tensors.write(block_file(tmp_path, 0), arrays | {"solved": (states[:, 5] > 0).astype(np.uint8)}, {})
+    model = train(tmp_path, TrainingConfig(epochs=1, updates=200, batch=256))
+    probe = np.zeros((2, 48))
+    probe[:, 5] = [-1.0, 1.0]
+    low, high = model.chance(probe, np.zeros(2))
+    assert low < 0.05
+    assert high > 0.95
+    assert tensors.read_about(tmp_path / MODEL)["curve"][0]["test_accuracy"] > 0.9
