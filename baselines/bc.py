@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 import torch
-from dextron_bench.methods.learners import Arrays, Track, Trainer
 from torch import Tensor
 
 from baselines import demonstrations, policy, snapshot
@@ -16,6 +15,8 @@ from baselines.networks import Stack
 from baselines.normalise import CLIP, EPSILON
 from baselines.policy import MeanAgent
 from baselines.schedule import SCHEDULES, Scheduled
+from dextron_bench import Track, Trainer
+from dextron_bench.methods.learners import Arrays
 
 BATCH = 512  # Table II.
 LEARNING_RATE = 1e-3

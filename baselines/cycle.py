@@ -6,9 +6,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import torch
-from dextron_bench.experts.policies import Case
-from dextron_bench.methods.learners import Arrays, Track
-from dextron_bench.world.engine import Engine
 from torch import Tensor
 
 from baselines import demonstrations
@@ -17,6 +14,9 @@ from baselines.policy import STATE
 from baselines.replay import Replay, Transitions
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import Schedule
+from dextron_bench import Case, Track
+from dextron_bench.methods.learners import Arrays
+from dextron_bench.world.engine import Engine
 
 CAPACITY = 1_000_000  # Transitions in either buffer (table II).
 FRAMES = 1000  # Control steps of the agent in an epoch.

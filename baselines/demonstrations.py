@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.experts.policies import Case, ExpertAgent
-from dextron_bench.methods.learners import Track
+from safetensors.numpy import load_file, save_file
+
+from dextron_bench import Case, ExpertAgent, Track, rollout
 from dextron_bench.storage import atomic, hashing
 from dextron_bench.world import model
-from safetensors.numpy import load_file, save_file
 
 FORMAT = 1  # Of the cached file.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dextron_bench.experts.policies import ExpertAgent
+from dextron_bench import ExpertAgent
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 import numpy as np
+
+from dextron_bench import SuccessModel
 from dextron_bench.reaches.sources import SOURCES
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.success import network
-from dextron_bench.success.network import GRID, SuccessModel
+from dextron_bench.success.network import GRID
 from dextron_bench.world import task
 
 FILE = ".safetensors"  # What names a file, not a source of reaches.

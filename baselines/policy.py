@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from dextron_bench.methods.exact import Perceptron, rounded
 from torch import Tensor
 from torch.nn.functional import softplus
 
 from baselines.normalise import CLIP
+from dextron_bench import Perceptron
+from dextron_bench.methods.exact import rounded
 
 STATE = 48
 LOG_STD = (-20.0, 2.0)

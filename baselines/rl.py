@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from dextron_bench.methods.learners import Track, Trainer
 
 from baselines.cycle import Cycle
 from baselines.policy import MeanAgent
 from baselines.schedule import SCHEDULES, Scheduled
+from dextron_bench import Track, Trainer
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+import dextron_bench
 
 ROOT = Path(__file__).parents[1]
 LEVELS = {
@@ -36,6 +39,16 @@ SDKS = {  # Packages of others that one place alone imports.
     "rich": "dextron_bench/cli/",
 }
 TOP = ("dextron_bench/__init__.py", "dextron_bench/__main__.py")  # Above all levels.
+PUBLIC = ("world.gym", "world.suite", "world.model", "world.task", "success.network")  # Public modules.
+BASELINES_ALSO = {  # Private modules that baselines import, and why an outside entrant needs none of them.
+    "methods.exact": "rounding of an output that is not a perceptron's",
+    "methods.learners": "the type of named arrays",
+    "reaches.sources": "names of the sources for which weights can ship",
+    "storage.atomic": "the cache of demonstrations",
+    "storage.hashing": "the cache of demonstrations, and the hash of a success model",
+    "storage.tensors": "a success model in a file",
+    "world.engine": "SAC trains on the batched engine; Gymnasium's vector environment offers the same",
+}
 FILES = sorted(file for folder in ("dextron_bench", "baselines") for file in (ROOT / folder).rglob("*.py"))
 
 
@@ -59,17 +72,29 @@ def package(name: str) -> str:
 
 def faults(file: str, names: Iterator[str] | list[str]) -> list[str]:
     """Imports of a file that go up or sideways, or reach a package of others that has another home."""
-    here, found = package(file.removesuffix(".py").replace("/", ".")), []
+    here, problems = package(file.removesuffix(".py").replace("/", ".")), []
     for name in names:
         there = package(name)
-        if there in LEVELS and file not in TOP and here != there and LEVELS[there] >= LEVELS[here]:
-            found.append(f"{file} imports {name}: {here} is level {LEVELS[here]}, {there} is level {LEVELS[there]}")
+        if there == "baselines" and here != there:
+            problems.append(f"{file} imports {name}: no part of the benchmark imports its entrants")
+        elif there in LEVELS and file not in TOP and here != there and LEVELS[there] >= LEVELS[here]:
+            problems.append(f"{file} imports {name}: {here} is level {LEVELS[here]}, {there} is level {LEVELS[there]}")
         if name == f"dextron_bench.{here}" or (name.rpartition(".")[0] == f"dextron_bench.{here}" and _of_init(name)):
-            found.append(f"{file} imports its own package's __init__.py")
+            problems.append(f"{file} imports its own package's __init__.py")
+        if here == "baselines" and name.startswith("dextron_bench.") and not _is_open_to_baselines(name):
+            problems.append(f"{file} imports {name}, which is private")
+        if here != "baselines" and file not in TOP and name.removeprefix("dextron_bench.") in dextron_bench.__all__:
+            problems.append(f"{file} imports {name} through the public API; import its module")
         home = SDKS.get(name.partition(".")[0])
         if home and not file.startswith(home):
-            found.append(f"{file} imports {name}, whose home is {home}")
-    return found
+            problems.append(f"{file} imports {name}, whose home is {home}")
+    return problems
+
+
+def _is_open_to_baselines(name: str) -> bool:
+    path = name.removeprefix("dextron_bench.")
+    modules = (*PUBLIC, *BASELINES_ALSO)
+    return path in dextron_bench.__all__ or path in modules or path.rpartition(".")[0] in modules
 
 
 def _of_init(name: str) -> bool:
@@ -97,13 +122,30 @@ def test_every_package_has_a_level():
             "world is level 2, experts is level 3",
         ),
         ("dextron_bench/splits/loading.py", "dextron_bench.methods.registry", "splits is level 4, methods is level 4"),
-        ("dextron_bench/cli/run.py", "baselines.rl", None),
-        ("dextron_bench/runs/plans.py", "baselines.rl", "baselines is level 7"),
+        ("dextron_bench/cli/run.py", "baselines.rl", "no part of the benchmark imports its entrants"),
+        ("baselines/rl.py", "dextron_bench.rollout", None),
+        ("baselines/rl.py", "dextron_bench.runs.plans.Plan", "which is private"),
+        ("dextron_bench/cli/run.py", "dextron_bench.rollout", "through the public API"),
+        ("dextron_bench/runs/plans.py", "dextron_bench.scores.paired", "runs is level 7, scores is level 7"),
         ("dextron_bench/scores/paired.py", "rerun.chunk", "whose home is dextron_bench/recording/"),
         ("dextron_bench/recording/pair.py", "dextron_bench.recording.read", "its own package's __init__.py"),
     ],
 )
 def test_a_fault_is_noticed(file: str, name: str, fault: str | None):
-    found = faults(file, [name])
-    assert len(found) == (fault is not None)
-    assert all(fault in line for line in found if fault)
+    problems = faults(file, [name])
+    assert any(fault in problem for problem in problems) if fault else not problems
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    """At module level; an import inside a function, or for type checkers alone, closes no circle."""
+    modules = {file.relative_to(ROOT).with_suffix("").as_posix().replace("/", "."): file for file in FILES}
+    graph = {name: {target for target in _at_load(file) if target in modules} for name, file in modules.items()}
+    order = list(graphlib.TopologicalSorter(graph).static_order())  # Raises CycleError, which names the circle.
+    assert set(order) == modules.keys()
+
+
+def _at_load(file: Path) -> Iterator[str]:
+    """Modules that a file imports when it is loaded."""
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            yield from (node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names))
