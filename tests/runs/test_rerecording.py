@@ -128,7 +128,7 @@ def test_without_actions_only_what_is_recorded_is_there(tmp_path: Path):
 def test_an_episode_that_goes_otherwise_is_not_recorded(tmp_path: Path, column: str, value: float):
     folder = play(tmp_path)
     change(folder, **{column: value})
-    with pytest.raises(Unplayable, match=r"test row 0 of .* goes otherwise when it is played again: return .* not "):
+    with pytest.raises(Unplayable, match=r"test row 0 of .* differs when it is played again: return .* not "):
         restored(folder, EpisodeFilter(split=("test",), row=(0,)))
     assert not (folder / "recordings").exists()
 
@@ -136,7 +136,7 @@ def test_an_episode_that_goes_otherwise_is_not_recorded(tmp_path: Path, column: 
 def test_other_physics_and_another_version_of_the_split_are_told(tmp_path: Path):
     folder = play(tmp_path)
     change(folder, digest="0" * 64)
-    with pytest.raises(Unplayable, match="is of a version of the split that is no more"):
+    with pytest.raises(Unplayable, match="is of an older version of the split"):
         restored(folder)
     config = folder / "config.json"
     config.write_text(json.dumps(json.loads(config.read_text()) | {"physics": "other"}))

@@ -52,12 +52,12 @@ def test_a_wish_picks_these_episodes(wish: dict[str, Any], picked: list[int], ma
 @pytest.mark.parametrize(
     ("wish", "told"),
     [
-        ({"method": ("bc", "rlil")}, "no episode has method 'rlil'; there are bc, rl"),
-        ({"seed": (7,)}, "no episode has seed 7; there are 0, 1"),
-        ({"row": (3,)}, "no episode has row 3; there are 0 to 2"),
-        ({"cause": ("late",)}, "no episode has cause 'late'; there are solved, too early, too late, knocked over, "),
-        ({"cause": ("knocked over",)}, "of 7 episodes 0 are as asked for"),
-        ({"cause": ("agent failed",)}, "of 7 episodes 1 are as asked for; the agent failed before their first step"),
+        ({"method": ("bc", "rlil")}, "no episode has method 'rlil'; choose from bc, rl"),
+        ({"seed": (7,)}, "no episode has seed 7; choose from 0, 1"),
+        ({"row": (3,)}, "no episode has row 3; choose from 0 to 2"),
+        ({"cause": ("late",)}, "no episode has cause 'late'; choose from solved, too early, too late, knocked over, "),
+        ({"cause": ("knocked over",)}, "0 of 7 episodes pass the filter"),
+        ({"cause": ("agent failed",)}, "1 of 7 episodes pass the filter; the agent failed before their first step"),
     ],
 )
 def test_what_no_episode_has_is_told_with_what_there_is(wish: dict[str, Any], told: str):
@@ -68,7 +68,7 @@ def test_what_no_episode_has_is_told_with_what_there_is(wish: dict[str, Any], to
 
 @pytest.mark.parametrize("count", [0, -1])
 def test_fewer_than_one_episode_is_no_wish(count: int):
-    with pytest.raises(BadFilter, match=f"--best {count}: pick 1 episode or more"):
+    with pytest.raises(BadFilter, match=f"--best {count}: select 1 episode or more"):
         EpisodeFilter(best=count)
 
 
@@ -78,7 +78,7 @@ def test_recordings_are_found_at_files_and_below_folders_each_once(tmp_path: Pat
     for file in files:
         file.touch()
     assert selection.recordings([files[0], tmp_path]) == files
-    with pytest.raises(NoEpisodes, match=r"there is no .*empty"):
+    with pytest.raises(NoEpisodes, match=r"empty does not exist; "):
         selection.recordings([tmp_path / "empty"])
     (tmp_path / "empty" / "folder.rrd").mkdir(parents=True)
     with pytest.raises(NoEpisodes, match=r"no recordings at .*empty"):

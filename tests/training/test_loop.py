@@ -175,7 +175,7 @@ def test_numbers_that_are_not_finite_end_it_with_the_last_good_checkpoint(tmp_pa
         with pytest.raises(Diverged) as caught:
             train(tmp_path / "a", Toy(preset="quick", spoils=5))
         assert str(caught.value) == (
-            "training of 'toy-0.1' diverged: 'loss' of seed 3 is nan in epoch 5; the last good checkpoint is that of "
+            "training of 'toy-0.1' diverged: 'loss' of seed 3 is nan in epoch 5; the last good checkpoint is at "
             f"epoch 4 in {tmp_path / 'a'}"
         )
     with pytest.raises(Diverged, match="in epoch 1; there is no checkpoint yet"):
