@@ -1,4 +1,4 @@
-"""`dextron-bench doctor`: what this machine has of what the benchmark needs."""
+"""`dextron-bench doctor`: reports whether this machine has what the benchmark needs."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 
+from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_json, print_table
-from dextron_bench.reaches import sources
-from dextron_bench.reaches.recorded import cache
 
 
 @dataclass(frozen=True)
 class Doctor:
-    """Show versions, renderers, devices and data; exit code 1 where something needed is missing.
+    """Show versions, renderers, devices and data; exit with code 1 if something is missing that the benchmark needs.
 
     Example: dextron-bench doctor
     """
@@ -26,16 +25,13 @@ class Doctor:
     """Print JSON, one object for each finding."""
 
     def __call__(self) -> int:
-        from dextron_bench.cli.doctor import examine
-
         findings = list(examine())
         if self.json:
             print_json([asdict(finding) for finding in findings])
         else:
-            signs = {(True, True): "yes", (True, False): "yes", (False, True): "MISSING", (False, False): "no"}
-            rows = [(f.what, signs[f.found, f.needed], f.detail) for f in findings]
-            print_table("dextron-bench on this machine", ["what", "there", "detail"], rows)
-        return 0 if all(finding.found for finding in findings if finding.needed) else 1
+            rows = [(finding.what, finding.status, finding.detail) for finding in findings]
+            print_table("dextron-bench on this machine", ["what", "available", "detail"], rows)
+        return DONE if all(finding.found for finding in findings if finding.needed) else DIFFERS
 
 
 PACKAGES = (
@@ -47,7 +43,7 @@ PACKAGES = (
 RENDERERS = ("egl", "osmesa", "glfw")
 
 
-PATIENCE = 30.0  # [s] for one renderer.
+TIMEOUT = 30.0  # [s] for one renderer.
 
 
 RENDER = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 64, 64).render()"
@@ -55,16 +51,23 @@ RENDER = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at: whether it is there, whether the benchmark needs it, and what was found."""
+    """One check: `found` if the thing is available, `needed` if the benchmark needs it."""
 
     what: str
     found: bool
     needed: bool
     detail: str
 
+    @property
+    def status(self) -> str:
+        """The result in one word."""
+        if self.found:
+            return "yes"
+        return "MISSING" if self.needed else "no"
+
 
 def examine() -> Iterator[Finding]:
-    """Looks at one thing after the other."""
+    """Checks one thing after another."""
     yield Finding("python", sys.version_info >= (3, 11), True, platform.python_version())
     for package in PACKAGES:
         yield _package(package)
@@ -72,7 +75,9 @@ def examine() -> Iterator[Finding]:
     yield _cuda()
     for name in RENDERERS:
         yield _renderer(name)
-    for name in sources.SOURCES:
+    from dextron_bench.reaches.sources import SOURCES
+
+    for name in SOURCES:
         yield _source(name)
 
 
@@ -94,20 +99,23 @@ def _cuda() -> Finding:
 
 
 def _renderer(name: str) -> Finding:
-    """Tries a GL back end in a process of its own, which is all that it can crash."""
+    """Tries a GL back end in a separate process, because it may crash."""
     environment = {**os.environ, "MUJOCO_GL": name}
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", RENDER], env=environment, capture_output=True, text=True, timeout=PATIENCE
+        process = subprocess.run(
+            [sys.executable, "-c", RENDER], env=environment, capture_output=True, text=True, timeout=TIMEOUT
         )
     except subprocess.TimeoutExpired:
-        return Finding(f"MUJOCO_GL={name}", False, False, f"no answer in {PATIENCE:.0f} s")
-    lines = done.stderr.strip().splitlines()
-    detail = "renders" if done.returncode == 0 else (lines[-1] if lines else f"ended with {done.returncode}")
-    return Finding(f"MUJOCO_GL={name}", done.returncode == 0, False, detail)
+        return Finding(f"MUJOCO_GL={name}", False, False, f"no answer in {TIMEOUT:.0f} s")
+    lines = process.stderr.strip().splitlines()
+    detail = "renders" if process.returncode == 0 else (lines[-1] if lines else f"exit code {process.returncode}")
+    return Finding(f"MUJOCO_GL={name}", process.returncode == 0, False, detail)
 
 
 def _source(name: str) -> Finding:
+    from dextron_bench.reaches import sources  # Loads SciPy, which help does not need.
+    from dextron_bench.reaches.recorded import cache
+
     needed = name != "real"
     try:
         reaches = sources.open_source(name).names

@@ -54,7 +54,8 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
     "leaderboard": (
-        "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard, or add to it.",
+        "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
+        "add a submission to it.",
         {
             **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
             **{"verify": leaderboard_verify.Verify, "add": leaderboard_verify.Add},
@@ -98,7 +99,7 @@ Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or inpu
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; `arguments` default to those of the process."""
-    os.environ.setdefault(BLAS, "1")  # Must be set before the import of NumPy.
+    _limit_blas_threads()
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words or bool(os.environ.get("DEXTRON_DEBUG"))
     words = [word for word in words if word != "--debug"]
@@ -117,6 +118,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code, message = explain(error)
         print(f"dextron-bench: {message}", file=sys.stderr)
         return code
+
+
+def _limit_blas_threads() -> None:
+    """Gives NumPy's products one thread, unless the user sets OPENBLAS_NUM_THREADS."""
+    if BLAS in os.environ:
+        return
+    import threadpoolctl
+
+    os.environ[BLAS] = "1"  # For libraries that are loaded later, such as SciPy's.
+    threadpoolctl.threadpool_limits(1, user_api="blas")  # For NumPy's, which `import dextron_bench` has loaded.
 
 
 def explain(error: BaseException) -> tuple[int, str]:

@@ -31,7 +31,7 @@ class Mine:
         {spoil}
         return actions
 """
-HEAVY = {"mujoco", "torch", "pandas", "gymnasium", "scipy", "matplotlib", "rerun", "pyarrow", "dm_control", "numpy"}
+HEAVY = {"mujoco", "torch", "pandas", "scipy", "matplotlib", "rerun", "pyarrow", "dm_control"}
 
 
 @pytest.fixture
