@@ -1,1 +1,1 @@
-"""Playing episodes: agents on settings, replays of actions, and why episodes fail."""
+"""Plays episodes: agents on settings, replays of recorded actions, and the cause of each failure."""

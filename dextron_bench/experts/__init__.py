@@ -1,0 +1,1 @@
+"""Experts: the class Pi_E of policies and the expert database G_s (paper, II.C)."""

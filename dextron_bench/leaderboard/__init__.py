@@ -1,0 +1,1 @@
+"""The leaderboard: published results, its page, submissions and their verification."""

@@ -1,6 +1,6 @@
-"""Recordings: one episode in one .rrd file, exact enough to be verified, drawn so that a person sees it.
+"""Recordings: one episode in one .rrd file, with exact arrays for verification and a layout for the viewer.
 
-The only package that talks to Rerun.
+This is the only package that imports Rerun.
 """
 
 from dextron_bench.recording.episode_file import BrokenRecording, Recording, Value, read, write

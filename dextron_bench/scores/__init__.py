@@ -1,0 +1,1 @@
+"""Scores: estimates, ranks and comparisons computed from results, and their figures."""

@@ -1,1 +1,1 @@
-"""The success model: from what a hand does in a state, the chance that the grasp succeeds (paper, II.E)."""
+"""The success model Omega: the chance that a grasp succeeds after an action in a state (paper, II.E)."""

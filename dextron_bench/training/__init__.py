@@ -1,0 +1,1 @@
+"""Training: the loop around a learner, its checkpoints and its learning curve."""

@@ -1,0 +1,1 @@
+"""The simulated world: hand, bottle, task, engine and environments."""

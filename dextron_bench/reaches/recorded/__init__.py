@@ -1,0 +1,1 @@
+"""The authors' 575 recordings: download, checks, parsing and cache."""
