@@ -48,15 +48,15 @@ class Check:
 
         how = prepare_launch(self.agent, entry.settle(self.agent, self.settings, self.reaches), self.weights)
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
-        found = []
+        results = []
         for check in conformance.checks(how, self.reaches, limits, self.threads):
-            found.append(check)
+            results.append(check)
             if not self.json:
                 print(f"{check.verdict:4}  {check.what}: {check.found}", flush=True)
-        bad = [check for check in found if check.verdict == conformance.MEND]
+        failed = [check for check in results if check.verdict == conformance.MEND]
         if self.json:
-            print_json([{"what": each.what, "verdict": each.verdict, "found": each.found} for each in found])
+            print_json([{"what": check.what, "verdict": check.verdict, "found": check.found} for check in results])
         else:
             ready = f"ready: dextron-bench submit {shlex.quote(self.agent)} --name NAME"
-            print(f"{len(bad)} to mend" if bad else ready)
-        return DIFFERS if bad else DONE
+            print(f"{len(failed)} to fix" if failed else ready)
+        return DIFFERS if failed else DONE

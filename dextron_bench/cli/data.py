@@ -1,25 +1,27 @@
-"""`dextron-bench data`: the recorded reaches, and what a source holds."""
+"""`dextron-bench data`: gets the recorded reaches and describes a source of reaches."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.reaches.sources import SourceName
 
 
 @dataclass(frozen=True)
 class Import:
-    """Import the authors' 575 recorded reaches from their release, checking every file.
+    """Import the authors' 575 recorded reaches from their release, and verify every file.
 
     Example: dextron-bench data import --from dextron-a101b9e.zip
     """
 
     source: Annotated[Path, tyro.conf.arg(name="from", metavar="ZIP|FOLDER")]
-    """The release: its zip, its unpacked folder, a checkout, or the data or extracts folder in it."""
+    """The release: its zip, the unpacked folder, a checkout, or the folder data or extracts in it."""
     quiet: bool = False
     """Show no progress."""
 
@@ -29,7 +31,7 @@ class Import:
         with progress_bar("reaches", self.quiet) as progress:
             reaches = cache.import_release(self.source.expanduser(), progress=progress)
         print(f"{len(reaches)} reaches imported into {cache.cache_file()}")
-        return 0
+        return DONE
 
 
 @dataclass(frozen=True)
@@ -48,17 +50,17 @@ class Fetch:
         with progress_bar("bytes", self.quiet) as progress:
             reaches = download.fetch(progress=progress)
         print(f"{len(reaches)} reaches imported into {cache.cache_file()}")
-        return 0
+        return DONE
 
 
 @dataclass(frozen=True)
 class Info:
-    """Show what a source holds, by subject and by start region: number, duration, path length, speed.
+    """Show the number, duration, path length and speed of a source's reaches, by subject and by start region.
 
     Example: dextron-bench data info --reaches real --picture reaches.png
     """
 
-    reaches: Literal["real", "synthetic", "minjerk"] = "real"
+    reaches: SourceName = "real"
     """The source of reaches."""
     picture: Path | None = None
     """Also draw all paths in 3D, coloured by start region, into this file (png, pdf or svg)."""
@@ -70,13 +72,13 @@ class Info:
         from dextron_bench.reaches.summary import group_means, reach_table
 
         source = open_source(self.reaches)
-        found = reach_table(source)
+        reaches = reach_table(source)
         if self.json:
-            print_json(group_means(found, ["subject", "ring", "angle"]).to_dict("records"))
+            print_json(group_means(reaches, ["subject", "ring", "angle"]).to_dict("records"))
         else:
             for by in (["subject"], ["ring", "angle"]):
-                table = group_means(found, by)
-                title = f"{len(found)} {self.reaches} reaches by {' and '.join(by)}"
+                table = group_means(reaches, by)
+                title = f"{len(reaches)} {self.reaches} reaches by {' and '.join(by)}"
                 columns = [*by, "reaches", "duration [s]", "length [m]", "speed [m/s]"]
                 rows = table[[*by, "reaches", "duration", "length", "speed"]].itertuples(index=False)
                 print_table(title, columns, rows)
@@ -84,4 +86,4 @@ class Info:
             from dextron_bench.scores.figures import reach_paths
 
             reach_paths(source, self.picture)
-        return 0
+        return DONE

@@ -1,14 +1,16 @@
-"""`dextron-bench data export`: episodes as a Minari data set."""
+"""`dextron-bench data export`: writes episodes as a Minari data set."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     from dextron_bench.evaluation.minari_export import Player
@@ -16,29 +18,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Export:
-    """Play episodes on a split and store them as a Minari data set, for offline learning (needs the extra `minari`).
+    """Play episodes on a split and store them as a Minari data set for offline learning (needs the extra `minari`).
 
-    Each setting's own expert plays or, where files of weights are given, their policies do, one after the other.
+    The expert of each setting plays. With --weights, the policies in these files play instead, one after another.
 
     Example: dextron-bench data export --into datasets --reaches synthetic --split train --rows 200
     """
 
     into: Annotated[Path, tyro.conf.arg(metavar="FOLDER")]
-    """Where data sets live: MINARI_DATASETS_PATH of whoever loads it, by default ~/.minari/datasets."""
-    reaches: Literal["real", "synthetic", "minjerk"] = "synthetic"
+    """The folder of all data sets: the reader's MINARI_DATASETS_PATH, by default ~/.minari/datasets."""
+    reaches: SourceName = "synthetic"
     """The source of reaches."""
     split: str = "train"
     """The split."""
     rows: int = 200
-    """Play the first so many of its rows."""
+    """How many of its rows to play, from the first."""
     weights: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.safetensors")] = ()
-    """Weights of the policies that play in place of experts."""
+    """Weights of the policies that play instead of the experts."""
     name: str = ""
-    """The data set's name; by default it says reaches, split and who plays, as dextron/real-train-experts-v0."""
+    """The name of the data set; by default reaches, split and players, such as dextron/real-train-experts-v0."""
     author: str = ""
-    """Who stands as its author; by default the contributors of dextron-bench."""
+    """The author of the data set; by default the contributors of dextron-bench."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor. The data set does not depend on it."""
+    """Threads of the simulation; 0 means one per processor. The data set does not depend on it."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
@@ -52,16 +54,16 @@ class Export:
         split = load_split(self.reaches, self.split)
         name = self.name or f"dextron/{self.reaches}-{self.split}-{'policies' if self.weights else 'experts'}-v0"
         rows = min(self.rows, len(split.cases))
-        wanted = minari_export.Export(name, split, rows, self._players(), self.author or minari_export.CONTRIBUTORS)
+        export = minari_export.Export(name, split, rows, self._players(), self.author or minari_export.CONTRIBUTORS)
         with progress_bar("episodes", self.quiet) as progress:
-            found = wanted.write(open_source(self.reaches), self.into.expanduser(), self.threads, progress)
-        row = minari_export.summary(found)
+            folder = export.write(open_source(self.reaches), self.into.expanduser(), self.threads, progress)
+        row = minari_export.summary(folder)
         if self.json:
-            print_json({"name": name, "folder": str(found), **row})
+            print_json({"name": name, "folder": str(folder), **row})
         else:
             print_table(f"Minari data set {name}", list(row), [list(row.values())])
-            print(found)
-        return 0
+            print(folder)
+        return DONE
 
     def _players(self) -> list[Player]:
         from dextron_bench.evaluation import minari_export

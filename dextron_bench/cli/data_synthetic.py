@@ -1,4 +1,4 @@
-"""`dextron-bench data fit` and `data likeness`: the model behind synthetic reaches, and how like they are."""
+"""`dextron-bench data fit` and `data likeness`: fits the model of synthetic reaches and tests their realism."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
@@ -17,23 +18,23 @@ if TYPE_CHECKING:
 
 
 class BadSeed(ValueError):
-    """A seed below zero."""
+    """The seed is negative."""
 
     def __init__(self, seed: int) -> None:
-        super().__init__(f"a seed is 0 or more, not {seed}")
+        super().__init__(f"a seed must be 0 or more, not {seed}")
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Fit the model of synthetic reaches to the recorded ones again, and say how far it is from the shipped one.
+    """Fit the model of synthetic reaches to the recorded ones again, and compare it with the shipped model.
 
     Example: dextron-bench data fit --into synthetic-reaches.npz
     """
 
     seed: int = 0
-    """Seed of the fit; the shipped model has 0."""
+    """Seed of the fit; the shipped model has seed 0."""
     into: Annotated[Path, tyro.conf.arg(metavar="FILE.npz")] = Path("synthetic-reaches.npz")
-    """File to write the parameters to."""
+    """The file for the parameters."""
     quiet: bool = False
     """Show no progress."""
 
@@ -41,7 +42,7 @@ class Fit:
         from importlib.resources import files
 
         from dextron_bench.reaches.recorded import cache
-        from dextron_bench.reaches.synthetic import fitting
+        from dextron_bench.reaches.synthetic import fitting, parameters
         from dextron_bench.storage import atomic
 
         if self.seed < 0:
@@ -50,40 +51,40 @@ class Fit:
         with progress_bar("models fitted", self.quiet) as progress, TemporaryDirectory() as folder:
             model = fitting.fit(cache.load_reaches(), self.seed)
             progress(1, 1)
-            made = Path(folder) / "model.npz"
-            fitting.save(model, made)
-            content = made.read_bytes()
+            file = Path(folder) / "model.npz"
+            parameters.save(model, file)
+            content = file.read_bytes()
         into = self.into.expanduser()
         atomic.write_atomically(into, lambda part: part.write_bytes(content))
         print(f"{into}: {len(content):,} bytes, {compared(content, shipped)}")
-        return 0
+        return DONE
 
 
-def compared(made: bytes, shipped: bytes) -> str:
-    """What a file of parameters has in common with the shipped one, in words."""
+def compared(content: bytes, shipped: bytes) -> str:
+    """How a file of parameters differs from the shipped one, as text."""
     import numpy as np
 
-    if made == shipped:
+    if content == shipped:
         return "byte for byte the shipped file"
-    with np.load(io.BytesIO(made)) as new, np.load(io.BytesIO(shipped)) as old:
+    with np.load(io.BytesIO(content)) as new, np.load(io.BytesIO(shipped)) as old:
         pairs = {name: (new[name].astype(float), old[name].astype(float)) for name in old.files}
     if other := [name for name, (a, b) in pairs.items() if a.shape != b.shape]:
-        return f"not the shipped file: {', '.join(other)} differ in shape"
+        return f"not the shipped file: {', '.join(other)} have another shape"
     total = sum(a.size for a, _ in pairs.values())
     differ = sum(int((a != b).sum()) for a, b in pairs.values())
     if not differ:
-        return "every number as in the shipped file, but packed into other bytes"
-    far = {name: float(abs(a - b).max() / abs(b).max()) for name, (a, b) in pairs.items()}
-    worst = max(far, key=far.__getitem__)
+        return "all numbers equal those of the shipped file, but the bytes differ"
+    distances = {name: float(abs(a - b).max() / abs(b).max()) for name, (a, b) in pairs.items()}
+    worst = max(distances, key=distances.__getitem__)
     return (
-        f"not the shipped file: {differ:,} of {total:,} numbers differ, by at most {far[worst]:.1g} of the largest "
-        f"in their array ({worst})"
+        f"not the shipped file: {differ:,} of {total:,} numbers differ, by at most {distances[worst]:.1g} of the "
+        f"largest in their array ({worst})"
     )
 
 
 @dataclass(frozen=True)
 class Likeness:
-    """Ask classifiers to tell synthetic reaches from recorded ones: AUC, where 0.5 is guessing. Takes minutes.
+    """Train classifiers to separate synthetic from recorded reaches and print their AUC; 0.5 is chance. Takes minutes.
 
     Example: dextron-bench data likeness --json
     """
@@ -91,7 +92,7 @@ class Likeness:
     seed: int = 0
     """Seed of folds, fits, forests and intervals."""
     json: bool = False
-    """Print JSON: lists of rows by table, with every start region of every classifier."""
+    """Print JSON: lists of rows by table, with all start regions and classifiers."""
     quiet: bool = False
     """Show no progress."""
 
@@ -107,19 +108,19 @@ class Likeness:
             print_json({name: table.to_dict("records") for name, table in tables.items()})
         else:
             print_likeness(tables)
-        return 0
+        return DONE
 
 
 def print_likeness(tables: dict[str, pd.DataFrame]) -> None:
-    """The tables of `likeness.study` on stdout."""
+    """Prints the tables of `two_sample.study`."""
     held_out, strangers = with_interval(tables["held out"]), with_interval(tables["strangers"])
     whole = held_out[held_out["stratum"] == "all"]
-    print_pivot("AUC [95 %], by models without the reaches judged", whole, "group", "classifier")
-    for group, found in held_out[held_out["classifier"] == "forest"].groupby("group", sort=False):
-        print_places(f"AUC ± half of 95 % interval, forest, {group}", found)
-    for classifier, found in strangers.groupby("classifier", sort=False):
-        print_pivot(f"AUC for strangers, mean and range of splits, {classifier}", found, "group", "beside")
-    print_rows("least and greatest AUC of a single feature", tables["alone"])
+    print_pivot("AUC [95 %] on held-out reaches", whole, "group", "classifier")
+    for group, rows in held_out[held_out["classifier"] == "forest"].groupby("group", sort=False):
+        print_regions(f"AUC ± half of 95 % interval, forest, {group}", rows)
+    for classifier, rows in strangers.groupby("classifier", sort=False):
+        print_pivot(f"AUC for strangers, mean and range of splits, {classifier}", rows, "group", "beside")
+    print_rows("lowest and highest AUC of a single feature", tables["alone"])
     distances = tables["nearest"].set_index("source") * 1000.0
     print_rows("mm to the nearest other recording, quantiles", distances.reset_index())
     names = tables["distributions"]["measure"].str.replace("[", "in ").str.rstrip("]")
@@ -127,27 +128,27 @@ def print_likeness(tables: dict[str, pd.DataFrame]) -> None:
 
 
 def with_interval(table: pd.DataFrame) -> pd.DataFrame:
-    """A table of AUCs with a column `cell` of text: the AUC and its bounds."""
+    """A table of AUCs with a column `cell`: the AUC and its interval as text."""
     cells = [f"{row.auc:.2f} [{row.low:.2f}, {row.high:.2f}]" for row in table.itertuples()]
     return table.assign(cell=cells)
 
 
-def print_places(title: str, table: pd.DataFrame) -> None:
-    """AUCs of one group and classifier on stdout: rings down, angles across, and all of either."""
-    places = {
+def print_regions(title: str, table: pd.DataFrame) -> None:
+    """Prints the AUCs of one group and classifier: a row for each ring, a column for each angle, and the totals."""
+    texts = {
         row["stratum"]: f"{row['auc']:.2f} ±{(row['high'] - row['low']) / 2:.2f}" for row in table.to_dict("records")
     }
-    rings, angles = ([name for name in places if name.startswith(kind)] for kind in ("ring", "angle"))
-    rows = [[ring, *(places.get(f"{ring[-1]}-{angle[-1]}", "") for angle in angles), places[ring]] for ring in rings]
-    print_table(title, ["", *angles, "all"], [*rows, ["all", *(places[angle] for angle in angles), places["all"]]])
+    rings, angles = ([name for name in texts if name.startswith(kind)] for kind in ("ring", "angle"))
+    rows = [[ring, *(texts.get(f"{ring[-1]}-{angle[-1]}", "") for angle in angles), texts[ring]] for ring in rings]
+    print_table(title, ["", *angles, "all"], [*rows, ["all", *(texts[angle] for angle in angles), texts["all"]]])
 
 
 def print_pivot(title: str, table: pd.DataFrame, rows: str, columns: str) -> None:
-    """Cells of a table on stdout, one row and one column for each of their values in two columns."""
+    """Prints the column `cell` of a table as a grid: the values of `rows` down, the values of `columns` across."""
     wide = table.set_index([rows, columns])["cell"].unstack(sort=False)
     print_table(title, [rows, *wide.columns], wide.reset_index().to_numpy().tolist())
 
 
 def print_rows(title: str, table: pd.DataFrame) -> None:
-    """A table on stdout as it is."""
+    """Prints a table with all its columns."""
     print_table(title, [str(column) for column in table.columns], table.itertuples(index=False))

@@ -1,17 +1,18 @@
-"""`dextron-bench eval`: evaluate weights that ship, or a file's, without training."""
+"""`dextron-bench eval`: evaluates shipped weights, or the weights in a file, without training."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.leaderboard import print_rows
-from dextron_bench.cli.method_flags import chosen
+from dextron_bench.cli.method_flags import settings_dict
 from dextron_bench.cli.output import progress_bar
-from dextron_bench.cli.run import EPISODES_FAILED
+from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
@@ -19,29 +20,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Eval:
-    """Evaluate the weights of a trained method that ship with the package, or those of a file, and print its rows.
+    """Evaluate the shipped weights of a trained method, or the weights in a file, and print its rows.
 
-    A method's own settings are flags too, as for `run`. Files go to `eval` below the folder of runs.
+    The settings of a method are flags too, as for `run`. The files go to the folder `eval` in the folder of runs.
 
     Example: dextron-bench eval --method rlil --dur 0.1 --preset quick --split test
     """
 
     method: str
-    """A method's name (see `dextron-bench list`), module:Class or file.py:Class."""
-    reaches: Literal["real", "synthetic", "minjerk"] = "synthetic"
+    """The name of a method (see `dextron-bench list`), module:Class or file.py:Class."""
+    reaches: SourceName = "synthetic"
     """The source of reaches."""
     split: tuple[str, ...] = ()
-    """The splits to evaluate on; by default all that rank methods."""
+    """The splits to evaluate on; by default all splits that rank methods."""
     seed: tuple[int, ...] = ()
-    """Seeds whose weights to take; by default all that ship."""
+    """The seeds of the weights; by default all that ship."""
     weights: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
-    """Weights to take in place of those that ship, such as weights.safetensors of a run's folder."""
+    """A file of weights to use instead of the shipped ones, such as weights.safetensors in the folder of a run."""
     record: int = 0
-    """Record the first so many episodes of each split."""
+    """How many episodes of each split to record, from the first."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor. Results do not depend on it."""
+    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
@@ -60,14 +61,14 @@ class Eval:
             results.append(result_files.read_result(run.folder(self.runs / "eval").result))
         rows = standings.table(results)
         print_rows(rows[rows["split"].isin(runs[0].splits)], self.json)
-        return EPISODES_FAILED if rows["failed"].any() else 0
+        return EPISODES_FAILED if rows["failed"].any() else DONE
 
     def _runs(self) -> list[plans.Run]:
-        """What to evaluate: a run for each seed."""
+        """The runs to evaluate, one for each seed."""
         from dextron_bench.methods import weights as method_weights
         from dextron_bench.runs.plans import Plan, resolve, with_shipped_weights
 
-        run = resolve(Plan(self.method, self.reaches, self.split, 0, self.record, chosen(self.settings)))
+        run = resolve(Plan(self.method, self.reaches, self.split, 0, self.record, settings_dict(self.settings)))
         if self.weights is None:
             return with_shipped_weights(run, self.seed)
         if len(self.seed) > 1:

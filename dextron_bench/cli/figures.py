@@ -1,48 +1,49 @@
-"""`dextron-bench figures`: the paper's figures from what ships and what was published."""
+"""`dextron-bench figures`: draws the paper's figures from shipped data and published results."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.success_eval import NoRows
+from dextron_bench.reaches.sources import RankedSource
 
 
 @dataclass(frozen=True)
 class Figures:
     """Draw the paper's figures 3, 4 and 5, and the README's pictures.
 
-    3: where settings that can be grasped start, and all reaches. 4: learning curves of the methods that live in the
-    world, of the success model, and of those that clone experts. 5: what the success model thinks in five kinds of
-    episodes, which are played and found anew.
+    3: the start points of solvable settings, and all reaches. 4: learning curves of the methods that train in the
+    simulated world, of the success model, and of behaviour cloning. 5: the predictions of the success model in five
+    kinds of episodes; the command plays and selects these episodes again.
 
     Example: dextron-bench figures --reaches synthetic --into figures
     """
 
-    reaches: Literal["real", "synthetic"] = "synthetic"
+    reaches: RankedSource = "synthetic"
     """The source of reaches."""
     into: Path = Path("figures")
-    """Folder for the pictures."""
+    """The folder for the pictures."""
     results: Path = Path("leaderboard/results")
-    """Results whose learning curves are figures 4a and 4c; where the folder is not there, they are left out."""
+    """Results with the learning curves of figures 4a and 4c; these are left out if the folder does not exist."""
     rows: int = 3000
-    """Points in figure 3a at most."""
+    """Maximum number of points in figure 3a."""
     settings: int = 100
-    """Settings of `test` on which figure 5 plays experts and the policies that ship."""
+    """How many settings of `test` the experts and the shipped policies play for figure 5."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor."""
+    """Threads of the simulation; 0 means one per processor."""
 
     def __call__(self) -> int:
         from dextron_bench.recording import stills
 
         if min(self.rows, self.settings) < 1:
-            raise NoRows("--rows and --settings are how many are drawn and played, 1 or more")
+            raise NoRows("--rows and --settings must be 1 or more")
         self.into.mkdir(parents=True, exist_ok=True)
         for file in (*self._reaches(), *self._learning(), *self._success(), *stills.write_pictures(self.into)):
             print(file)
-        return 0
+        return DONE
 
     def _file(self, name: str) -> Path:
         return self.into / f"{name}-{self.reaches}.png"
@@ -68,11 +69,12 @@ class Figures:
 
         rows = standings.table(result_files.results(self.results)) if self.results.exists() else None
         for name, cloned, epochs in (("fig4a", False, "epochs of 1,000 frames"), ("fig4c", True, "epochs of cloning")):
-            found = build.learning_curves(self.results, cloned)
-            curves = {method: own for (method, reaches), own in found.items() if reaches == self.reaches}
+            all_curves = build.learning_curves(self.results, cloned)
+            curves = {method: seeds for (method, reaches), seeds in all_curves.items() if reaches == self.reaches}
             if curves and rows is not None:
-                own = rows[rows["reaches"] == self.reaches]
-                figures.learning_curves(curves, own.head(0) if cloned else own, self._file(name), epochs)
+                source_rows = rows[rows["reaches"] == self.reaches]
+                constant = source_rows.head(0) if cloned else source_rows
+                figures.learning_curves(curves, constant, self._file(name), epochs)
                 yield self._file(name)
 
     def _success(self) -> Iterator[Path]:
@@ -87,7 +89,7 @@ class Figures:
         files = [file for file in weights.all_shipped(self.reaches) if file.stem == "seed0"]
         policies = {file.parts[-3]: weights.load_agent_from_file(file) for file in files}
         model, cases = network.shipped_model(self.reaches), load_split(self.reaches, "test").cases[: self.settings]
-        seen = exemplars.play_and_predict(model, open_source(self.reaches), cases, policies, self.threads)
-        chosen = exemplars.choose(seen)
-        figures.ridges({exemplars.KINDS[kind]: each for kind, each in chosen.items()}, self._file("fig5"))
+        episodes = exemplars.play_and_predict(model, open_source(self.reaches), cases, policies, self.threads)
+        chosen = exemplars.choose(episodes)
+        figures.ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self._file("fig5"))
         yield self._file("fig5")

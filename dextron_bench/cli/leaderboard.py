@@ -1,14 +1,13 @@
-"""`dextron-bench leaderboard`: the rows of all runs in a folder, the published ones, and their page."""
+"""`dextron-bench leaderboard show, build, serve`: the rows of runs, the published leaderboard, and its page."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Show:
-    """Print the leaderboard of the runs in a folder, computed from their episodes' scores, and how episodes end.
+    """Print the leaderboard of the runs in a folder, and how their episodes end.
 
     Example: dextron-bench leaderboard show --runs leaderboard/results
     """
@@ -35,18 +34,18 @@ class Show:
         print_rows(rows, self.json)
         if not self.json:
             print_endings(rows)
-        return 0
+        return DONE
 
 
 @dataclass(frozen=True)
 class Build:
-    """Make the published leaderboard's tables, pictures and page from its results, after finished runs' are added.
+    """Build the tables, pictures and page of the published leaderboard from its results.
 
     Example: dextron-bench leaderboard build --runs runs --into leaderboard
     """
 
     runs: Path | None = None
-    """Folder of runs whose results, learning curves and weights are published; by default none is added."""
+    """A folder of finished runs to publish first: their results, learning curves and weights."""
     into: Path = Path("leaderboard")
     """Folder of the leaderboard."""
 
@@ -56,20 +55,20 @@ class Build:
         if self.runs is not None:
             print(*collect.take(self.runs, self.into), sep="\n")
         print(*build.build(self.into), sep="\n")
-        return 0
+        return DONE
 
 
 @dataclass(frozen=True)
 class Serve:
-    """Serve the leaderboard's page to this machine alone, recordings opened in Rerun's web viewer; Ctrl-C ends it.
+    """Serve the leaderboard's page on this machine only, with recordings in Rerun's web viewer. Ctrl-C stops it.
 
     Example: dextron-bench leaderboard serve --port 8000
     """
 
     port: int = 8765
-    """Where to listen on 127.0.0.1; 0 takes a free port."""
+    """The port on 127.0.0.1; 0 takes a free one."""
     into: Path = Path("leaderboard")
-    """Folder of the leaderboard, beside that of its recordings."""
+    """Folder of the leaderboard; its recordings are in the folder recordings next to it."""
 
     def __call__(self) -> int:
         from dextron_bench.leaderboard import server as leaderboard_server
@@ -79,71 +78,47 @@ class Serve:
             try:
                 server.site.viewer.update(web_viewer_files())
             except ViewerError as error:
-                print(f"dextron-bench: recordings will be downloaded, not opened: {error}", file=sys.stderr)
+                print(f"dextron-bench: links download recordings, without a viewer: {error}", file=sys.stderr)
             print(server.address, flush=True)
             server.serve_forever()
-        return 0
+        return DONE
 
 
 def print_rows(rows: pd.DataFrame, as_json: bool) -> None:
-    """The leaderboard's rows on stdout."""
+    """Prints the leaderboard's rows, a table for each source of reaches and split, or JSON."""
+    from dextron_bench.scores import cells
+
     if as_json:
         print_json([{name: none_for_nan(value) for name, value in row.items()} for row in rows.to_dict("records")])
         return
     if rows.empty:
         print("no results yet; `dextron-bench run --method exp` makes some")
         return
+    columns = ["rank", "method", "return [95 %]", "success % [95 %]", "interquartile mean [95 %]", "regret"]
     for (reaches, split), group in rows.groupby(["reaches", "split"], sort=False):
-        failed = bool(group["failed"].any())
-        cells = [
+        counts = ["seeds", "episodes", *(["failed"] if group["failed"].any() else [])]
+        lines = [
             [
-                "" if isnan(row["rank"]) else f"{row['rank']:.0f}",
-                row["method"],
-                _interval(row, "return", 2),
-                _interval(row, "success", 1, 100.0),
-                "" if isnan(row["iqm"]) else _interval(row, "iqm", 2),
-                "" if isnan(row["regret"]) else f"{row['regret']:.2f}",
-                row["seeds"],
-                row["episodes"],
-                *([row["failed"]] if failed else []),
+                *(cells.rank(row), row["method"], cells.mean_return(row), cells.success(row)),
+                *(cells.interquartile_mean(row), cells.regret(row), *(row[name] for name in counts)),
             ]
             for row in group.to_dict("records")
         ]
-        columns = [
-            "rank",
-            "method",
-            "return [95 %]",
-            "success % [95 %]",
-            "interquartile mean [95 %]",
-            "regret",
-            "seeds",
-        ]
-        columns += ["episodes", *(["failed"] if failed else [])]
-        print_table(f"{reaches} reaches, split {split}, version {group['version'].iloc[0]}", columns, cells)
-
-
-def _interval(row: Mapping[Any, Any], name: str, digits: int, unit: float = 1.0) -> str:
-    mean, low, high = (f"{unit * row[column]:.{digits}f}" for column in (name, f"{name}_low", f"{name}_high"))
-    return f"{mean} [{low}, {high}]"
+        title = f"{reaches} reaches, split {split}, version {group['version'].iloc[0]}"
+        print_table(title, [*columns, *counts], lines)
 
 
 def print_endings(rows: pd.DataFrame) -> None:
-    """How the episodes of the leaderboard's rows end [%], on stdout (docs/diagnosis.md)."""
+    """Prints how the episodes of the leaderboard's rows end [%] (docs/diagnosis.md)."""
     from dextron_bench.evaluation.diagnosis import CAUSES
+    from dextron_bench.scores import cells
 
     for (reaches, split), group in rows.groupby(["reaches", "split"], sort=False):
-        cells = [
-            [
-                row["method"],
-                *(f"{100 * row[cause] / row['episodes']:.1f}" for cause in CAUSES),
-                "" if row["closing_lag"] != row["closing_lag"] else f"{row['closing_lag']:.2f}",
-            ]
-            for row in group.to_dict("records")
-        ]
+        lines = [[row["method"], *cells.cause_shares(row), cells.closing_lag(row)] for row in group.to_dict("records")]
         title = f"how episodes end [%]: {reaches} reaches, split {split}"
-        print_table(title, ["method", *CAUSES, "closing lag [s]"], cells)
+        print_table(title, ["method", *CAUSES, "closing lag [s]"], lines)
 
 
 def none_for_nan(value: Any) -> Any:
-    """A value that JSON has, where it has no NaN."""
+    """None for NaN, which JSON does not have; any other value unchanged."""
     return None if value != value else value

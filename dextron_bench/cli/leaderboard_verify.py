@@ -1,4 +1,4 @@
-"""`dextron-bench leaderboard verify` and `add`: submissions and the board's own rows, checked."""
+"""`dextron-bench leaderboard verify` and `add`: verifies submissions and the leaderboard's own rows."""
 
 from __future__ import annotations
 
@@ -7,24 +7,25 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import progress_bar
+from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     from dextron_bench.leaderboard.submission.verdict import Verdict
 
-DONE, DIFFERS = 0, 1
-SHOWN = 5  # Problems of a row that are told.
+SHOWN = 5  # How many problems of a row are printed.
 
 
 @dataclass(frozen=True)
 class Verify:
-    """Check a submission: play its actions again and hold all that it says against what happens.
+    """Verify a submission: replay its actions and compare all its claims with the replayed episodes.
 
-    With --all every row of a leaderboard is checked: submissions by their actions, baselines by running them again.
+    With --all, verify every row of a leaderboard: replay the actions of submissions, and run the baselines again.
 
     Example: dextron-bench leaderboard verify my-agent-synthetic.zip
     """
@@ -32,21 +33,21 @@ class Verify:
     bundle: tyro.conf.Positional[Path | None] = None
     """The submission."""
     all: bool = False
-    """Check the leaderboard's own rows in place of a submission."""
+    """Verify the leaderboard's own rows instead of a submission."""
     rows: int = 0
-    """With --all: only so many rows of each split, drawn at random; 0 takes all."""
+    """With --all: how many rows of each split to verify, drawn at random; 0 means all."""
     method: tuple[str, ...] = ()
-    """With --all: only these rows of the table."""
-    reaches: tuple[Literal["real", "synthetic", "minjerk"], ...] = ()
-    """With --all: only rows on these sources; `real` ones need the recorded reaches."""
+    """With --all: only the rows of these methods."""
+    reaches: tuple[SourceName, ...] = ()
+    """With --all: only rows on these sources; `real` needs the recorded reaches."""
     stamp: bool = False
-    """With --all: note in the results of baselines that were wholly run again that they were, and build the board."""
+    """With --all: give baselines that ran again completely the tier `re-run`, and build the leaderboard."""
     rerun: bool = False
-    """Also run the submission's agent again, isolated, from the files in its bundle."""
+    """Also run the agent of the submission again, isolated, from the files in its bundle."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor. Results do not depend on it."""
+    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
     quiet: bool = False
     """Show no progress."""
 
@@ -54,37 +55,37 @@ class Verify:
         from dextron_bench.leaderboard import verify_board
 
         if self.all == (self.bundle is not None):
-            raise verify_board.NothingToVerify("name a submission, or give --all for the leaderboard's own rows")
+            raise verify_board.NothingToVerify("give a submission, or --all for the leaderboard's own rows")
         if self.bundle is None:
-            return self._board()
+            return self._verify_board()
         with unpacked(self.bundle) as opened:
-            return told(_verified(opened, self.board, self.rerun, self.threads, self.quiet))
+            return print_verdict(_verify(opened, self.board, self.rerun, self.threads, self.quiet))
 
-    def _board(self) -> int:
+    def _verify_board(self) -> int:
         from dextron_bench.leaderboard import build, verify_board
 
         sound = True
         for row in verify_board.rows(self.board, self.method, self.reaches):
             with progress_bar(row.name, self.quiet) as progress:
-                found = verify_board.check(row, self.rows, self.threads, progress)
-            print(f"{row.name}: {found.done if not found.problems else 'NOT what its episodes give'}", flush=True)
-            for problem in found.problems[:SHOWN]:
+                finding = verify_board.check(row, self.rows, self.threads, progress)
+            print(f"{row.name}: {finding.done if not finding.problems else 'DIFFERS from its episodes'}", flush=True)
+            for problem in finding.problems[:SHOWN]:
                 print(f"  {problem}")
-            sound &= not found.problems
-            if self.stamp and verify_board.stamp(row, found):
+            sound &= not finding.problems
+            if self.stamp and verify_board.stamp(row, finding):
                 print("  its tier is now `re-run`")
         if self.stamp:
             build.build(self.board)
         if problems := verify_board.differing_files(self.board):
-            print("tables and page: NOT what the results give", *problems, sep="\n  ")
+            print("tables and page: DIFFER from the results", *problems, sep="\n  ")
         else:
-            print("tables and page: computed again from the results, and equal")
+            print("tables and page: equal to those computed again from the results")
         return DONE if sound and not problems else DIFFERS
 
 
 @dataclass(frozen=True)
 class Add:
-    """Verify a submission and put it on the leaderboard, whose tables and page are made again.
+    """Verify a submission, add it to the leaderboard, and build the tables and the page again.
 
     Example: dextron-bench leaderboard add my-agent-synthetic.zip
     """
@@ -92,13 +93,13 @@ class Add:
     bundle: tyro.conf.Positional[Path]
     """The submission."""
     rerun: bool = False
-    """Also run its agent again, isolated: the tier of its row is then `re-run`, else `replayed`."""
+    """Also run its agent again, isolated; the tier of its row is then `re-run` instead of `replayed`."""
     replace: bool = False
-    """Put it in place of a submission of the same name."""
+    """Replace a submission of the same name."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor. Results do not depend on it."""
+    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
     quiet: bool = False
     """Show no progress."""
 
@@ -108,8 +109,8 @@ class Add:
         with unpacked(self.bundle) as opened:
             manifest = opened[1]
             add.check_name(manifest["name"], manifest["reaches"], self.board, self.replace)
-            verdict = _verified(opened, self.board, self.rerun, self.threads, self.quiet)
-            code = told(verdict)
+            verdict = _verify(opened, self.board, self.rerun, self.threads, self.quiet)
+            code = print_verdict(verdict)
             if verdict.sound:
                 print(*add.merge(verdict, self.board), sep="\n")
         return code
@@ -117,22 +118,22 @@ class Add:
 
 @contextmanager
 def unpacked(file: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """A bundle's folder and manifest, while they are needed."""
+    """Unpacks a bundle into a temporary folder; yields the folder and the manifest."""
     from dextron_bench.leaderboard.submission import bundle as submission_bundle
 
     with TemporaryDirectory(prefix="dextron-bundle-") as folder:
         yield Path(folder), submission_bundle.unpack(file, Path(folder))
 
 
-def _verified(opened: tuple[Path, dict[str, Any]], board: Path, rerun: bool, threads: int, quiet: bool) -> Verdict:
+def _verify(opened: tuple[Path, dict[str, Any]], board: Path, rerun: bool, threads: int, quiet: bool) -> Verdict:
     from dextron_bench.leaderboard.submission import verification
 
     with progress_bar("verifying", quiet) as progress:
         return verification.verify(*opened, board, rerun, threads, report=progress)
 
 
-def told(verdict: Verdict) -> int:
-    """Prints what verification found; returns the exit code."""
+def print_verdict(verdict: Verdict) -> int:
+    """Prints the result of a verification and returns the exit code."""
     name = f"{verdict.manifest['name']} on {verdict.manifest['reaches']} reaches"
     for note in verdict.notes:
         print(f"note: {note}")

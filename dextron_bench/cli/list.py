@@ -1,10 +1,11 @@
-"""`dextron-bench list`: what there is to run, and what was run."""
+"""`dextron-bench list`: lists methods, splits and runs."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_table
 
 
@@ -24,14 +25,14 @@ class List:
         from dextron_bench.splits.loading import all_splits, load_split
         from dextron_bench.training import jobs
 
-        about = [(name, registry.describe(name)) for name in registry.installed_methods()]
-        found = [load_split(*names) for names in all_splits()]
-        rows = [(split.reaches, split.name, len(split.cases), split.digest[:8]) for split in found]
-        print_table("methods", ["name", "what it is"], about)
+        methods = [(name, registry.describe(name)) for name in registry.installed_methods()]
+        splits = [load_split(*names) for names in all_splits()]
+        rows = [(split.reaches, split.name, len(split.cases), split.digest[:8]) for split in splits]
+        print_table("methods", ["name", "description"], methods)
         print_table("splits", ["reaches", "split", "rows", "version"], rows)
         done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in result_files.results(self.runs)]
-        under_way = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in jobs.unfinished(self.runs)]
-        if under_way:
-            print_table(f"trainings in {self.runs}", ["method", "reaches", "seeds", "left"], under_way)
+        trainings = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in jobs.unfinished(self.runs)]
+        if trainings:
+            print_table(f"trainings in {self.runs}", ["method", "reaches", "seeds", "left"], trainings)
         print_table(f"runs in {self.runs}", ["method", "reaches", "seed", "splits"], done)
-        return 0
+        return DONE

@@ -1,37 +1,38 @@
-"""`dextron-bench mc`: the Monte Carlo search for experts."""
+"""`dextron-bench mc`: searches for experts by Monte Carlo sampling."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.reaches.sources import SourceName
 
 
 @dataclass(frozen=True)
 class MonteCarlo:
-    """Draw settings and experts at random and keep those that grasp: build or extend an expert database.
+    """Draw settings and experts at random and keep the pairs that grasp: build or extend an expert database.
 
-    Killed at any moment, the same command goes on where it was and finds the same rows.
+    If the search is interrupted, the same command continues it and gives the same rows.
 
     Example: dextron-bench mc --reaches real --rows 10000 --seed 0
     """
 
-    reaches: Literal["real", "synthetic", "minjerk"] = "synthetic"
+    reaches: SourceName = "synthetic"
     """The source of reaches."""
     rows: int = 1000
-    """Search until so many rows have the full sum of rewards, 20."""
+    """Search until this many rows have the full return of 20."""
     seed: int = 0
     """Seed of all draws."""
     share: str = "0/1"
-    """The part of the search that this process does, as 0/2 and 1/2 of two: several may work in one folder."""
+    """The part of the search that this process does: 0/2 and 1/2 split it between two processes in one folder."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor."""
+    """Threads of the simulation; 0 means one per processor."""
     extend: bool = False
-    """Go on from the shipped database of this source of reaches, not from nothing."""
+    """Start from the shipped database of this source of reaches, not from an empty one."""
     runs: Path = Path("runs")
-    """Folder of all runs; the search lives below it."""
+    """Folder of all runs; the search is stored in it."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
@@ -47,8 +48,8 @@ class MonteCarlo:
         source = open_source(self.reaches)
         engine = Engine(montecarlo.SLOTS, self.threads)
         if self.extend:
-            known, about = database.load_shipped(self.reaches)
-            montecarlo.restore(source, search, folder, known, about["settings"] // search.block)
+            rows, summary = database.load_shipped(self.reaches)
+            montecarlo.restore(source, search, folder, rows, summary["settings"] // search.block)
         with progress_bar("rows of return 20", self.quiet) as progress:
             draws = montecarlo.run(
                 source, search, folder, self.rows, engine,
@@ -57,11 +58,11 @@ class MonteCarlo:
         file, summary = database.save(draws, source, search, folder, f"experts-{self.reaches}")
         if self.json:
             print_json(summary)
-            return 0
+            return DONE
         columns = ["by", "value", "draws", "kept", "solved", "kept [%]", "solved [%]"]
         rows = [
             [*list(row.values())[:5], 100 * row["kept_rate"], 100 * row["solved_rate"]] for row in summary["statistics"]
         ]
         print_table(f"{self.reaches}: {summary['kept']} of {summary['draws']} draws kept", columns, rows)
         print(f"{summary['kept']} rows ({summary['solved']} of return 20) of {summary['draws']} draws: {file}")
-        return 0
+        return DONE

@@ -1,4 +1,4 @@
-"""`dextron-bench new-agent`: a small agent to begin with."""
+"""`dextron-bench new-agent`: writes a small agent to start from."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from pathlib import Path
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DONE
+
 
 @dataclass(frozen=True)
 class NewAgent:
-    """Write a small agent that works, and its test, into a new folder.
+    """Write a small working agent and its test into a new folder.
 
     Example: dextron-bench new-agent my_agent
     """
 
     folder: tyro.conf.Positional[Path]
-    """The folder to make."""
+    """The new folder."""
 
     def __call__(self) -> int:
         from dextron_bench.leaderboard.submission import starter
@@ -26,4 +28,4 @@ class NewAgent:
         print(f"try it:    dextron-bench check {self.folder}/agent.py:MyAgent")
         print(f"score it:  dextron-bench run --method {self.folder}/agent.py:MyAgent")
         print(f"submit it: dextron-bench submit {self.folder}/agent.py:MyAgent --name my-agent  (docs/agents.md)")
-        return 0
+        return DONE

@@ -43,8 +43,8 @@ def progress_bar(title: str, quiet: bool = False) -> Iterator[Progress]:
     if quiet or not sys.stderr.isatty():
         yield no_progress
         return
-    from rich.console import Console
     from rich import progress as rich
+    from rich.console import Console
 
     columns = (
         *(rich.TextColumn("{task.description}"), rich.BarColumn(), rich.MofNCompleteColumn()),

@@ -1,32 +1,33 @@
-"""`dextron-bench recordings choose`: a small choice of recordings that shows what there is."""
+"""`dextron-bench recordings choose`: selects a few recordings of the runs to show."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_table
+from dextron_bench.reaches.sources import SourceName
 
 
 @dataclass(frozen=True)
 class Choose:
-    """Put a small choice of the runs' recordings into a folder, made where they are missing.
+    """Copy a few recordings of the runs into a folder; record the episodes that are not recorded yet.
 
-    Of every method a success and a failure, the shortest; and of the five kinds of episodes that explain the success
-    model the clearest each.
+    These are the shortest success and the shortest failure of every method, and the clearest episode of each of the
+    five kinds that explain the success model.
 
     Example: dextron-bench recordings choose --reaches real --into recordings
     """
 
     into: Path = Path("recordings")
-    """Where the recordings go."""
-    reaches: tuple[Literal["real", "synthetic", "minjerk"], ...] = ("synthetic", "minjerk")
-    """Sources of reaches; a method is shown on the first of them that it played."""
+    """The folder for the recordings."""
+    reaches: tuple[SourceName, ...] = ("synthetic", "minjerk")
+    """Sources of reaches, in order; each method is shown on the first one that it played."""
     split: str = "test"
-    """The split whose episodes are chosen from."""
+    """The split of the episodes."""
     rows: int = 100
-    """How many of its first rows."""
+    """How many rows of the split to choose from, from the first."""
     runs: Path = Path("runs")
     """Folder of all runs."""
 
@@ -41,4 +42,4 @@ class Choose:
             for file, row in zip(files, chosen[columns].itertuples(index=False), strict=True)
         ]
         print_table(f"recordings in {self.into}", ["file", "method", "row", "return", "steps", "cause", "kB"], cells)
-        return 0
+        return DONE

@@ -1,4 +1,4 @@
-"""`dextron-bench run`: train a method, evaluate it, record episodes, print its rows."""
+"""`dextron-bench run`: trains a method, evaluates it, records episodes and prints its rows."""
 
 from __future__ import annotations
 
@@ -8,49 +8,49 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.leaderboard import print_rows
-from dextron_bench.cli.method_flags import chosen
+from dextron_bench.cli.method_flags import settings_dict
 from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
 
-EPISODES_FAILED = 3
-
 
 @dataclass(frozen=True)
 class Run:
-    """Run a method on the splits of a source of reaches, beside the floors, and print the leaderboard.
+    """Run a method and the floors on the splits of a source of reaches, and print the leaderboard.
 
-    A method that learns is trained first, all seeds together. A method's own settings are flags too:
-    `dextron-bench run --method rlil --help` shows them. What a run folder already holds is not computed again:
-    the same command goes on where it was stopped.
+    A method that learns is trained first, with all seeds together. The settings of a method are flags too:
+    `dextron-bench run --method rlil --help` shows them. Nothing that a run folder already holds is computed again:
+    the same command continues an interrupted run.
 
     Example: dextron-bench run --method rlil --dur 0.1 --preset smoke --reaches synthetic --seed 0 1 2
     """
 
     method: str = "exp"
-    """A method's name (see `dextron-bench list`), module:Class or file.py:Class."""
+    """The name of a method (see `dextron-bench list`), module:Class or file.py:Class."""
     all: bool = False
-    """Run every method of the paper's table in place of one; --preset then holds for all that train."""
-    reaches: Literal["real", "synthetic", "minjerk"] = "synthetic"
+    """Run every method of the paper's table instead of one; --preset then applies to all methods with training."""
+    reaches: SourceName = "synthetic"
     """The source of reaches."""
     split: tuple[str, ...] = ()
-    """The splits to evaluate on; by default all that rank methods."""
+    """The splits to evaluate on; by default all splits that rank methods."""
     seed: tuple[int, ...] = (0,)
     """Seeds of the agent."""
     record: int = 1
-    """Record the first so many episodes of each split."""
+    """How many episodes of each split to record, from the first."""
     floors: bool = True
-    """Also evaluate the do-nothing and the random agent, for comparison."""
+    """Also evaluate the two floors for comparison: an agent that does nothing and a random one."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor. Results do not depend on it."""
+    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
     device: Literal["cpu", "cuda", "auto"] = "cpu"
-    """What networks are trained on; auto takes a GPU where there is one. The last bits depend on it."""
+    """The device for training; auto uses a GPU if there is one. The last bits of the weights depend on it."""
     dry_run: bool = False
-    """Only say what there is to do and about how long it takes."""
+    """Only print what is left to do and an estimate of the time."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
@@ -59,14 +59,14 @@ class Run:
 
     def __call__(self) -> int:
         groups = self._groups()
-        return self._foretell(groups) if self.dry_run else self._execute(groups)
+        return self._estimate(groups) if self.dry_run else self._execute(groups)
 
     def _groups(self) -> list[list[plans.Run]]:
-        """What to run: methods, each with its seeds."""
+        """The runs of each method, one for each seed."""
         from dextron_bench.methods import registry
         from dextron_bench.runs.plans import Plan, resolve
 
-        settings = chosen(self.settings)
+        settings = settings_dict(self.settings)
         methods = registry.paper_methods(**settings) if self.all else [(self.method, settings)]
         runs = [resolve(Plan(spec, self.reaches, self.split, 0, self.record, flags)) for spec, flags in methods]
         reaches = self.reaches if self.all else runs[0].source
@@ -91,26 +91,32 @@ class Run:
         rows = standings.table(results)
         rows = rows[rows["split"].isin({name for group in groups for name in group[0].splits})]
         print_rows(rows, self.json)
-        return EPISODES_FAILED if rows["failed"].any() else 0
+        return EPISODES_FAILED if rows["failed"].any() else DONE
 
-    def _foretell(self, groups: list[list[plans.Run]]) -> int:
+    def _estimate(self, groups: list[list[plans.Run]]) -> int:
         from dextron_bench.runs.estimates import estimate
 
         rows = estimate(groups, self.runs, self.threads, self.device)
         if self.json:
             print_json(rows)
-            return 0
+            return DONE
         cells = [
-            [row["what"], row["method"], row["reaches"], " ".join(map(str, row["seeds"])), row["left"], told(row)]
+            [
+                row["what"],
+                row["method"],
+                row["reaches"],
+                " ".join(map(str, row["seeds"])),
+                row["left"],
+                time_text(row["seconds"]),
+            ]
             for row in rows
         ]
         print_table("left to do", ["what", "method", "reaches", "seeds", "left", "time"], cells)
-        return 0
+        return DONE
 
 
-def told(row: dict[str, Any]) -> str:
-    """About how long something takes, in words."""
-    seconds = row["seconds"]
+def time_text(seconds: float | None) -> str:
+    """An estimated time as text."""
     if seconds is None:
         return "unknown"
     if seconds < 90:

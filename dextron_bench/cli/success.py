@@ -1,37 +1,39 @@
-"""`dextron-bench success`: the success model's data set, its training, and how good it is."""
+"""`dextron-bench success data` and `success train`: the data set of the success model, and its training."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.reaches.sources import RankedSource
 
 
 @dataclass(frozen=True)
 class Data:
-    """Play the episodes that the success model learns from: of experts, and of trained policies.
+    """Play episodes of experts and of trained policies: the data set of the success model.
 
-    Killed at any moment, the same command goes on where it was and makes the same data set.
+    If it is interrupted, the same command continues and gives the same data set.
 
     Example: dextron-bench success data --reaches synthetic --policies runs/*/synthetic/seed*/weights.safetensors
     """
 
-    reaches: Literal["real", "synthetic"] = "synthetic"
+    reaches: RankedSource = "synthetic"
     """The source of reaches."""
     rows: int = 1_000_000
-    """Play until there are so many transitions."""
+    """Play until there are this many transitions."""
     policies: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.safetensors")] = ()
-    """Weights of the policies that play half of the episodes, in turn; without any, all are the experts'."""
+    """Weights of the policies that play half of the episodes, in turn; by default experts play all episodes."""
     seed: int = 0
     """Seed of all draws."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor."""
+    """Threads of the simulation; 0 means one per processor."""
     runs: Path = Path("runs")
-    """Folder of all runs; the data set lives below it."""
+    """Folder of all runs; the data set is stored in it."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
@@ -45,37 +47,37 @@ class Data:
         from dextron_bench.success import generation
 
         agents = {hashing.sha256(file): weights.load_agent_from_file(file) for file in self.policies}
-        wanted = generation.DatasetConfig(self.reaches, self.seed, tuple(agents))
+        config = generation.DatasetConfig(self.reaches, self.seed, tuple(agents))
         source, train = open_source(self.reaches), load_split(self.reaches, "train").cases
         folder = folder_of(self.runs, self.reaches, self.seed)
         with progress_bar("transitions", self.quiet) as progress:
-            found = generation.generate(source, train, wanted, folder, self.rows, agents, self.threads, progress)
-        rows = [{"kind": kind, **tally.as_dict()} for kind, tally in found.items() if tally.rows]
-        rows.append({"kind": "all", **sum(found.values(), generation.Tally()).as_dict()})
+            tallies = generation.generate(source, train, config, folder, self.rows, agents, self.threads, progress)
+        rows = [{"kind": kind, **tally.as_dict()} for kind, tally in tallies.items() if tally.rows]
+        rows.append({"kind": "all", **sum(tallies.values(), generation.Tally()).as_dict()})
         if self.json:
             print_json(rows)
         else:
             print_table(f"data set in {folder}", list(rows[0]), [list(row.values()) for row in rows])
-        return 0
+        return DONE
 
 
 @dataclass(frozen=True)
 class Train:
-    """Train the success model on a data set that `success data` made; four in five of its episodes are learned from.
+    """Train the success model on a data set of `success data`; a fifth of the episodes is held out.
 
-    Killed at any moment, the same command goes on and ends with the same bytes.
+    If it is interrupted, the same command continues and gives the same bytes.
 
     Example: dextron-bench success train --reaches synthetic --epochs 30
     """
 
-    reaches: Literal["real", "synthetic"] = "synthetic"
+    reaches: RankedSource = "synthetic"
     """The source of reaches."""
     data: int = 0
     """Seed of the data set."""
     epochs: int = 30
-    """How long to train, in epochs of 1,000 batches."""
+    """Number of epochs; an epoch has 1,000 batches."""
     seed: int = 0
-    """Seed of the network and its batches."""
+    """Seed of the network and of its batches."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     quiet: bool = False
@@ -88,14 +90,14 @@ class Train:
         folder = folder_of(self.runs, self.reaches, self.data)
         with progress_bar("epochs", self.quiet) as progress:
             training.train(folder, training.TrainingConfig(epochs=self.epochs, seed=self.seed), progress)
-        told = tensors.read_about(folder / training.MODEL)
-        best = told["curve"][told["best_epoch"] - 1]
+        training_info = tensors.read_about(folder / training.MODEL)
+        best = training_info["curve"][training_info["best_epoch"] - 1]
         columns = ["epoch", "loss", "accuracy", "test_loss", "test_accuracy"]
-        print_table("the best epoch on episodes held out", columns, [[best[column] for column in columns]])
+        print_table("the best epoch on held-out episodes", columns, [[best[column] for column in columns]])
         print(folder / training.MODEL)
-        return 0
+        return DONE
 
 
 def folder_of(runs: Path, reaches: str, seed: int) -> Path:
-    """Where a data set lives, and what is trained on it."""
+    """The folder of a data set and of the model that is trained on it."""
     return runs / "success" / reaches / f"seed{seed}"

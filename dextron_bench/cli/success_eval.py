@@ -1,16 +1,18 @@
-"""`dextron-bench success eval` and `success explain`: how good the success model is, and episodes that show it."""
+"""`dextron-bench success eval` and `success explain`: evaluates the success model and draws its predictions."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table
 from dextron_bench.cli.success import folder_of
+from dextron_bench.reaches.sources import RankedSource
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,34 +22,34 @@ if TYPE_CHECKING:
 
 
 class NoRows(ValueError):
-    """A wish for no row of a split."""
+    """A number of rows below 1."""
 
 
 @dataclass(frozen=True)
 class Eval:
-    """Judge a success model on episodes that it never saw: of experts, and of trained policies, on splits.
+    """Evaluate a success model on new episodes of experts and of trained policies.
 
-    Half of the experts' episodes are played by experts that solve their setting, half by experts drawn uniformly.
+    In half of the experts' episodes the expert solves the setting; in the other half it is drawn at random.
 
     Example: dextron-bench success eval --reaches synthetic --policies runs/*/synthetic/seed*/weights.safetensors
     """
 
-    reaches: Literal["real", "synthetic"] = "synthetic"
+    reaches: RankedSource = "synthetic"
     """The source of reaches."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
-    """The model; by default that of the data set with seed 0 in --runs, and where there is none the one that ships."""
+    """The model; by default the model of the data set with seed 0 in --runs, or the shipped one."""
     split: tuple[str, ...] = ()
-    """The splits; by default all that rank methods."""
+    """The splits; by default all splits that rank methods."""
     rows: int = 200
-    """Settings of each split that are played."""
+    """How many settings of each split to play, from the first."""
     policies: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.safetensors")] = ()
-    """Weights of policies whose episodes are foretold too."""
+    """Weights of policies to evaluate the model on too."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor."""
+    """Threads of the simulation; 0 means one per processor."""
     json: bool = False
-    """Print the rows as JSON, with the AUC by time of the reach, and the calibration."""
+    """Print the rows as JSON, with the AUC by time and the calibration."""
 
     def __call__(self) -> int:
         from dextron_bench.methods import weights
@@ -55,46 +57,46 @@ class Eval:
         from dextron_bench.splits.loading import load_split, ranking_splits
         from dextron_bench.success import evaluation
 
-        model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
+        model, source = load_model(self.model, self.runs, self.reaches), open_source(self.reaches)
         players = {"experts": None} | {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
         rows = []
         for name in self.split or ranking_splits(self.reaches):
             cases = _first(load_split(self.reaches, name).cases, self.rows)
             for player, agent in players.items():
-                played = cases if agent else evaluation.with_random_experts(cases)
-                found = evaluation.evaluate(model, source, played, agent, self.threads)
-                rows.append({"split": name, "player": player, **found.as_dict()})
+                player_cases = cases if agent else evaluation.with_random_experts(cases)
+                result = evaluation.evaluate(model, source, player_cases, agent, self.threads)
+                rows.append({"split": name, "player": player, **result.as_dict()})
         if self.json:
             print_json(rows)
         else:
             columns = [column for column, value in rows[0].items() if not isinstance(value, list)]
             print_table("success model", columns, [[row[column] for column in columns] for row in rows])
-        return 0
+        return DONE
 
 
 @dataclass(frozen=True)
 class Explain:
-    """Draw what a success model thinks at every step of five kinds of episodes that it finds by itself (Fig. 5).
+    """Draw the predictions of a success model in five kinds of episodes that the command selects (paper, Fig. 5).
 
     Example: dextron-bench success explain --reaches synthetic --policies runs/*/synthetic/seed*/weights.safetensors
     """
 
-    reaches: Literal["real", "synthetic"] = "synthetic"
+    reaches: RankedSource = "synthetic"
     """The source of reaches."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
-    """The model; by default that of the data set with seed 0 in --runs, and where there is none the one that ships."""
+    """The model; by default the model of the data set with seed 0 in --runs, or the shipped one."""
     split: str = "test"
-    """The split on which experts and policies are played."""
+    """The split that experts and policies play."""
     rows: int = 100
-    """Settings of it that are played."""
+    """How many settings of it to play, from the first."""
     policies: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.safetensors")] = ()
-    """Weights of the policies among which episodes are sought."""
+    """Weights of the policies whose episodes to choose from."""
     into: Path = Path("figures/fig5.png")
-    """The picture."""
+    """The file for the picture."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     threads: int = 0
-    """Threads of the simulation; 0 takes one for each processor."""
+    """Threads of the simulation; 0 means one per processor."""
 
     def __call__(self) -> int:
         from dextron_bench.methods import weights
@@ -103,49 +105,49 @@ class Explain:
         from dextron_bench.splits.loading import load_split
         from dextron_bench.success import exemplars
 
-        model, source = chosen(self.model, self.runs, self.reaches), open_source(self.reaches)
+        model, source = load_model(self.model, self.runs, self.reaches), open_source(self.reaches)
         cases = _first(load_split(self.reaches, self.split).cases, self.rows)
         policies = {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
-        found = exemplars.choose(exemplars.play_and_predict(model, source, cases, policies, self.threads))
+        chosen = exemplars.choose(exemplars.play_and_predict(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
-        figures.ridges({exemplars.KINDS[kind]: seen for kind, seen in found.items()}, self.into)
-        columns = ["kind", "player", "row", "reach", "return", "cause", "steps foretold [%]"]
+        figures.ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self.into)
+        columns = ["kind", "player", "row", "reach", "return", "cause", "correct steps [%]"]
         numbers = {case.setting: row for row, case in enumerate(cases)}
         cells = [
             [
                 kind,
-                seen.player,
-                numbers[seen.episode.setting],
-                seen.episode.setting.reach,
-                seen.episode.score,
-                seen.diagnosis.cause,
-                seen.accuracy * 100,
+                predicted.player,
+                numbers[predicted.episode.setting],
+                predicted.episode.setting.reach,
+                predicted.episode.score,
+                predicted.diagnosis.cause,
+                predicted.accuracy * 100,
             ]
-            for kind, seen in found.items()
+            for kind, predicted in chosen.items()
         ]
         print_table("episodes", columns, cells)
-        if lacking := [told for kind, told in exemplars.KINDS.items() if kind not in found]:
-            print(f"dextron-bench: none of these episodes shows: {'; '.join(lacking)}", file=sys.stderr)
+        if lacking := [title for kind, title in exemplars.KINDS.items() if kind not in chosen]:
+            print(f"dextron-bench: no episode of this kind: {'; '.join(lacking)}", file=sys.stderr)
         print(self.into)
-        return 0
+        return DONE
 
 
 def _first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
     if rows < 1:
-        raise NoRows(f"--rows is how many settings of a split are played, 1 or more, not {rows}")
+        raise NoRows(f"--rows must be 1 or more, not {rows}")
     return cases[:rows]
 
 
-def chosen(file: Path | None, runs: Path, reaches: str) -> SuccessModel:
-    """The model of a file; else the one trained in a folder of runs; else the one that ships."""
+def load_model(file: Path | None, runs: Path, reaches: str) -> SuccessModel:
+    """The model in a file; without one, the model trained in a folder of runs, or else the shipped one."""
     from dextron_bench.storage import tensors
     from dextron_bench.success import network, training
 
-    own = folder_of(runs, reaches, 0) / training.MODEL
-    if file is None and not own.exists():
+    trained = folder_of(runs, reaches, 0) / training.MODEL
+    if file is None and not trained.exists():
         return network.shipped_model(reaches)
-    place = file or own
-    learned = tensors.read_about(place).get("data", {}).get("search", {}).get("reaches", reaches)
-    if learned != reaches:
-        print(f"dextron-bench: {place} learned from {learned} reaches, these are {reaches} ones", file=sys.stderr)
-    return network.SuccessModel(tensors.read(place))
+    path = file or trained
+    source = tensors.read_about(path).get("data", {}).get("search", {}).get("reaches", reaches)
+    if source != reaches:
+        print(f"dextron-bench: {path} was trained on {source} reaches, not on {reaches} ones", file=sys.stderr)
+    return network.SuccessModel(tensors.read(path))

@@ -1,4 +1,4 @@
-"""A choice of recordings: each method's shortest success and failure, and the kinds of cases."""
+"""The recordings to show: each method's shortest success and failure, and exemplars of the success model."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from tests.helpers import fixed_success_model, tiny_benchmark
 
 @pytest.fixture
 def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Two runs of two episodes each, in the tiny world: one solves them, the other does not."""
+    """Two runs of two episodes in the tiny world: one solves both, the other neither."""
     tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
     model = fixed_success_model.model(0.9, slope=-8.0)  # It predicts success for most actions.
     monkeypatch.setattr(network, "shipped_model", lambda reaches: model)
-    words = ["--split", "test", "--no-floors", "--quiet", "--json", "--record", "0"]
+    options = ["--split", "test", "--no-floors", "--quiet", "--json", "--record", "0"]
     for method in ("exp", "nothing"):
-        assert main.main(["run", "--method", method, *words]) == 0
+        assert main.main(["run", "--method", method, *options]) == 0
     yield tmp_path / "runs"
     tiny_benchmark.forget()
 
 
-def test_each_methods_shortest_and_each_kind_of_case(runs: Path):
+def test_each_method_has_its_shortest_episodes_and_each_kind_its_clearest(runs: Path):
     chosen = highlights.choose(runs, ["synthetic"], "test", rows=100)
     names = chosen["name"].tolist()
     assert names[:2] == ["exp-success", "nothing-failure"]
@@ -43,16 +43,14 @@ def test_each_methods_shortest_and_each_kind_of_case(runs: Path):
         assert recording.read(file).episode.score == score
 
 
-def test_from_the_command_line(runs: Path, capsys: pytest.CaptureFixture[str]):
+def test_the_command_copies_the_recordings(runs: Path, capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
     assert main.main(["recordings", "choose", "--into", "few", "--rows", "1"]) == 0
     assert "nothing-failure.rrd" in capsys.readouterr().out
     assert (runs.parent / "few" / "exp-success.rrd").exists()
 
 
-def test_a_method_is_shown_where_it_played_and_without_a_model_there_are_no_cases(
-    runs: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_without_a_model_there_are_only_successes_and_failures(runs: Path, monkeypatch: pytest.MonkeyPatch):
     def missing(reaches: str) -> object:
         raise network.MissingModel(reaches)
 
@@ -62,6 +60,6 @@ def test_a_method_is_shown_where_it_played_and_without_a_model_there_are_no_case
     assert set(chosen["reaches"]) == {"synthetic"}
 
 
-def test_no_runs_of_the_split_is_told(runs: Path):
+def test_a_split_that_no_run_played_is_an_error(runs: Path):
     with pytest.raises(selection.NoEpisodes, match=r"no run in .* played open of synthetic reaches"):
         highlights.choose(runs, ["synthetic"], "open", rows=100)

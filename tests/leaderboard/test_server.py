@@ -1,4 +1,4 @@
-"""The leaderboard's server: who is served, and what is not."""
+"""The leaderboard's server: what it serves, to whom, and what it refuses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PAGE = '<a href="../recordings/a%2Bb-success.rrd">success</a>'
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[leaderboard_server.Server]:
-    """A server of a folder with one recording, a link that leads out of it, and a secret beside."""
+    """A server of a folder with one recording, a symbolic link that leads out of it, and a secret file outside."""
     for folder in ("board", "recordings"):
         (tmp_path / folder).mkdir()
     (tmp_path / "board/index.html").write_text(PAGE)
@@ -42,7 +42,7 @@ def server(tmp_path: Path) -> Iterator[leaderboard_server.Server]:
 
 @pytest.fixture
 def ask(server: leaderboard_server.Server) -> Callable[..., tuple[HTTPResponse, bytes]]:
-    """What the server answers; the path goes out as it is."""
+    """Sends a request with an unchanged path and returns the response and its body."""
 
     def ask(path: str, method: str = "GET", host: str | None = None) -> tuple[HTTPResponse, bytes]:
         connection = HTTPConnection(leaderboard_server.LOOPBACK, server.server_port, timeout=5)
@@ -98,14 +98,14 @@ def test_nothing_else_is_served(
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "", "[::1]"])
-def test_a_page_of_another_name_is_refused(host: str, ask: Callable[..., tuple[HTTPResponse, bytes]]):
-    """A site whose name comes to mean this machine (DNS rebinding) would read along otherwise."""
+def test_another_host_name_is_refused(host: str, ask: Callable[..., tuple[HTTPResponse, bytes]]):
+    """Otherwise a site could read recordings by pointing its name at this machine (DNS rebinding)."""
     answer, body = ask("/recordings/a+b-success.rrd", host=host)
     assert answer.status == 403
     assert b"RRF2" not in body
 
 
-def test_one_may_look_but_not_write(ask: Callable[..., tuple[HTTPResponse, bytes]]):
+def test_requests_that_write_are_refused(ask: Callable[..., tuple[HTTPResponse, bytes]]):
     answer, body = ask("/", method="HEAD")
     assert (answer.status, body) == (200, b"")
     for method in ("POST", "PUT", "DELETE", "OPTIONS"):
@@ -116,10 +116,12 @@ def test_other_machines_cannot_connect(server: leaderboard_server.Server):
     assert server.server_address[0] == "127.0.0.1"
     with socket.socket() as other:
         other.settimeout(2)
-        assert other.connect_ex(("127.0.0.2", server.server_port)) != 0  # An address of this machine, but not bound.
+        assert (
+            other.connect_ex(("127.0.0.2", server.server_port)) != 0
+        )  # An address of this machine that the server does not listen on.
 
 
-def test_a_folder_without_a_page_is_told(tmp_path: Path, complaint: Callable[..., str]):
+def test_a_folder_without_a_page_is_one_line(tmp_path: Path, complaint: Callable[..., str]):
     line = complaint("leaderboard", "serve", "--into", str(tmp_path))
     assert "has no index.html; `dextron-bench leaderboard build --into" in line
 
@@ -127,26 +129,26 @@ def test_a_folder_without_a_page_is_told(tmp_path: Path, complaint: Callable[...
 SERVED = """
 import signal
 from dextron_bench.cli.main import main
-signal.signal(signal.SIGINT, signal.default_int_handler)  # Which what started the tests may have switched off.
+signal.signal(signal.SIGINT, signal.default_int_handler)  # The process that started the tests may have disabled it.
 raise SystemExit(main(["leaderboard", "serve", "--port", "0"]))
 """
 
 
 @pytest.mark.slow
-def test_it_serves_the_viewer_until_it_is_interrupted():
-    words = [sys.executable, "-c", SERVED]
+def test_the_server_serves_the_viewer_until_it_is_interrupted():
+    command = [sys.executable, "-c", SERVED]
     root = Path(__file__).parents[2]
-    with subprocess.Popen(words, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
-        assert served.stdout
-        port = int(served.stdout.readline().strip().rpartition(":")[2].strip("/"))
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        port = int(process.stdout.readline().strip().rpartition(":")[2].strip("/"))
         connection = HTTPConnection(leaderboard_server.LOOPBACK, port, timeout=10)
         connection.request("GET", "/viewer/re_viewer_bg.wasm")
         answer = connection.getresponse()
         assert (answer.status, answer.headers["Content-Type"]) == (200, "application/wasm")
         assert answer.read(4) == b"\0asm"
         connection.close()
-        served.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGINT)
         try:
-            assert served.wait(30) == 130
+            assert process.wait(30) == 130
         finally:
-            served.kill()
+            process.kill()
