@@ -1,6 +1,6 @@
-"""Unit quaternions (w, x, y, z) in bulk: products, means, and squad interpolation (Dam et al., 1998).
+"""Functions on arrays of unit quaternions (w, x, y, z): products, means, squad interpolation (Dam et al., 1998).
 
-Everything is written in elementary operations on the last axis, so that results do not depend on a BLAS.
+All functions but `mean` use elementary operations on the last axis, so that results do not depend on a BLAS library.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ def unit(q: np.ndarray) -> np.ndarray:
 
 
 def continuous(q: np.ndarray) -> np.ndarray:
-    """The same rotations (n, 4) with signs chosen so that neighbours never lie more than 90 degrees apart."""
+    """The same rotations (n, 4), with signs chosen so that no two neighbours have a negative dot product."""
     flips = np.where((q[1:] * q[:-1]).sum(axis=-1) < 0, -1.0, 1.0)
     return np.concatenate([q[:1], q[1:] * np.cumprod(flips)[:, None]])
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Hamilton product of quaternions (..., 4): the rotation b, then a."""
+    """Hamilton product of quaternions (..., 4): the rotation b, followed by the rotation a."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     return np.stack(
@@ -42,7 +42,7 @@ def conjugate(q: np.ndarray) -> np.ndarray:
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Vectors v (..., 3) turned by unit quaternions q (..., 4)."""
+    """Vectors v (..., 3) rotated by unit quaternions q (..., 4)."""
     w, axis = q[..., :1], q[..., 1:]
     v = np.broadcast_to(v, axis.shape)
     t = 2.0 * cross(axis, v)
@@ -84,17 +84,17 @@ def mean(q: np.ndarray) -> np.ndarray:
 
 
 def squad_controls(q: np.ndarray) -> np.ndarray:
-    """Inner control quaternions (n, 4) of squad through near-evenly timed q (n, 4); the ends control themselves."""
+    """Inner control quaternions (n, 4) of squad through nearly evenly timed q (n, 4); each end is its own control."""
     forward = log(multiply(conjugate(q[1:-1]), q[2:]))
     backward = log(multiply(conjugate(q[1:-1]), q[:-2]))
     inner = multiply(q[1:-1], exp(-(forward + backward) / 4.0))
     return np.concatenate([q[:1], inner, q[-1:]])
 
 
-def squad(times: np.ndarray, q: np.ndarray, controls: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Smooth rotation through q (n, 4) at times [s] (n,), read at `at` [s] (m,); shape (m, 4)."""
-    i = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
-    u = np.clip((at - times[i]) / (times[i + 1] - times[i]), 0.0, 1.0)
+def squad(times: np.ndarray, q: np.ndarray, controls: np.ndarray, queries: np.ndarray) -> np.ndarray:
+    """Quaternions (m, 4), at times `queries` [s] (m,), of the smooth rotation through q (n, 4) at `times` [s] (n,)."""
+    i = np.clip(np.searchsorted(times, queries, side="right") - 1, 0, len(times) - 2)
+    u = np.clip((queries - times[i]) / (times[i + 1] - times[i]), 0.0, 1.0)
     outer = slerp(q[i], q[i + 1], u)
     inner = slerp(controls[i], controls[i + 1], u)
     return unit(slerp(outer, inner, 2.0 * u * (1.0 - u)))

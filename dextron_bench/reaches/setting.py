@@ -1,4 +1,4 @@
-"""Settings: everything random about one episode, frozen, so that it can be played again."""
+"""Settings, which hold everything random about one episode, so that the episode can be played again."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ OFFSET = 0.06  # [m] offsets are uniform in [-OFFSET, OFFSET] (table I).
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One episode's randomness: the reach, the offset of its grasp from the bottle, its duration."""
+    """Everything random about one episode: the reach, the offset of its grasp from the bottle, its duration noise."""
 
     reach: str
     offset_x: float  # [m]
@@ -25,17 +25,17 @@ class Setting:
 
 
 class UnknownReach(KeyError):
-    """A reach that the source does not have."""
+    """The source has no reach of that name; the message gives examples of its names."""
 
-    def __init__(self, name: str, source: str, some: Sequence[str]) -> None:
-        super().__init__(f"no reach {name!r} in source {source!r}; it has names like {', '.join(some[:3])}")
+    def __init__(self, name: str, source: str, names: Sequence[str]) -> None:
+        super().__init__(f"no reach {name!r} in source {source!r}; it has names like {', '.join(names[:3])}")
 
     def __str__(self) -> str:
         return str(self.args[0])
 
 
 class Source(Protocol):
-    """Where reaches come from: `real`, `synthetic` or `minjerk`."""
+    """A set of reaches and a distribution of settings: `real`, `synthetic` or `minjerk`."""
 
     name: str
     names: tuple[str, ...]
@@ -45,21 +45,21 @@ class Source(Protocol):
         ...
 
     def path(self, setting: Setting) -> Path:
-        """What the hand follows in that setting; raises UnknownReach, ReachError."""
+        """The path that the hand follows in that setting. Raises UnknownReach or ReachError."""
         ...
 
     def stratum(self, reach: str) -> Stratum:
-        """The groups that the reach belongs to; raises UnknownReach."""
+        """The subject and start region of the reach. Raises UnknownReach."""
         ...
 
     def duration(self, setting: Setting) -> float:
-        """How long the hand moves in that setting [s]; raises UnknownReach."""
+        """Time for which the hand moves in that setting [s]. Raises UnknownReach."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Stratum:
-    """Groups by which results are told apart: subject, and start region (ring 0 to 3, angle 0 to 3)."""
+    """The groups of a reach, by which results are broken down: subject and start region (ring 0 to 3, angle 0 to 3)."""
 
     subject: str
     ring: int
@@ -67,7 +67,7 @@ class Stratum:
 
 
 class ReachSource:
-    """A source made of reaches: uniform over them, with uniform offsets and normal duration noise."""
+    """A source with a list of reaches. It draws reaches and offsets uniformly, and normal duration noise."""
 
     def __init__(self, name: str, reaches: Sequence[Reach]) -> None:
         self.name = name
@@ -75,14 +75,14 @@ class ReachSource:
         self.names = tuple(self._reaches)
 
     def reach(self, name: str) -> Reach:
-        """The reach of that name; raises UnknownReach."""
+        """The reach of that name. Raises UnknownReach."""
         try:
             return self._reaches[name]
         except KeyError:
             raise UnknownReach(name, self.name, self.names) from None
 
     def sample(self, rng: np.random.Generator) -> Setting:
-        """Draws a setting; noise that would make the reach faster than it was recorded is drawn again."""
+        """Draws a setting. It draws the noise again if that makes the reach faster than the recording."""
         name = self.names[rng.integers(len(self.names))]
         offset_x, offset_y = rng.uniform(-OFFSET, OFFSET, 2)
         recorded = self.reach(name).duration
@@ -92,26 +92,26 @@ class ReachSource:
                 return Setting(name, float(offset_x), float(offset_y), noise)
 
     def path(self, setting: Setting) -> Path:
-        """The centred, shifted and scaled path of a setting; raises UnknownReach, ReachError."""
+        """The scaled, centred and shifted path of a setting. Raises UnknownReach or ReachError."""
         return path(self.reach(setting.reach), setting.offset_x, setting.offset_y, setting.duration_noise)
 
     def stratum(self, reach: str) -> Stratum:
-        """Subject and start region of a reach; raises UnknownReach."""
-        found = self.reach(reach)
-        return Stratum(found.subject, found.ring, found.angle)
+        """Subject and start region of the reach of that name. Raises UnknownReach."""
+        trajectory = self.reach(reach)
+        return Stratum(trajectory.subject, trajectory.ring, trajectory.angle)
 
     def duration(self, setting: Setting) -> float:
-        """Scaled duration of a setting's reach [s]; raises UnknownReach."""
+        """Scaled duration of a setting's reach [s]. Raises UnknownReach."""
         return float(scaled_duration(self.reach(setting.reach).duration, setting.duration_noise))
 
 
 def to_frame(settings: Sequence[Setting]) -> pd.DataFrame:
-    """A table with one setting a row and the fields of `Setting` as columns."""
+    """A table with one row for each setting, and the fields of `Setting` as columns."""
     return pd.DataFrame([asdict(setting) for setting in settings])
 
 
 def from_frame(frame: pd.DataFrame) -> list[Setting]:
-    """The settings of a table that has the fields of `Setting` among its columns."""
+    """The settings in a table, which has the fields of `Setting` among its columns."""
     columns = ("reach", "offset_x", "offset_y", "duration_noise")
     return [
         Setting(str(r), float(x), float(y), float(n)) for r, x, y, n in zip(*(frame[c] for c in columns), strict=True)

@@ -1,7 +1,7 @@
-"""The cache of recorded reaches: imported once from the authors' release, then read in milliseconds.
+"""The cache of recorded reaches. The benchmark imports the authors' release once, then reads the cache in milliseconds.
 
-One file holds all reaches, cleaned, with a digest of itself and of the manifest that they were checked
-against. It is written beside its place and moved there whole, so that a partial import never counts.
+One file holds all cleaned reaches, a digest of its content, and the digest of the manifest that they were checked
+against. The file is written under a temporary name and then renamed, so an interrupted import leaves no cache file.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from dextron_bench.reaches.recorded import parsing, release
 from dextron_bench.reaches.recorded.release import Manifest
 
 CACHE_FILE = "real-reaches.npz"
-LAYOUT = "1"  # Of the cache file; a cache of another layout is read from the release again.
+LAYOUT = "1"  # Version of the layout of the cache file; a file of another version counts as damaged.
 COLUMNS = ("names", "counts", "times", "positions", "quaternions", "reached")
 
 Progress = Callable[[int, int], None]
 
 
 class MissingData(LookupError):
-    """The recorded reaches are nowhere; the message says how to get them."""
+    """The recorded reaches are not on this machine; the message says how to get them."""
 
     def __init__(self, reason: str = "have not been imported") -> None:
         super().__init__(
@@ -38,9 +38,9 @@ class MissingData(LookupError):
 
 
 def cache_folder() -> Path:
-    """Where this machine keeps imported data: DEXTRON_CACHE, or the platform's place for caches."""
-    if named := os.environ.get("DEXTRON_CACHE"):
-        return Path(named).expanduser()
+    """The folder for imported data: DEXTRON_CACHE, or the platform's default for caches."""
+    if folder := os.environ.get("DEXTRON_CACHE"):
+        return Path(folder).expanduser()
     if sys.platform == "darwin":
         base = Path.home() / "Library" / "Caches"
     elif sys.platform == "win32":
@@ -51,43 +51,43 @@ def cache_folder() -> Path:
 
 
 def cache_file() -> Path:
-    """The file of imported reaches, there or not."""
+    """The path of the file of imported reaches, which need not exist."""
     return cache_folder() / CACHE_FILE
 
 
-def import_release(where: Path, manifest: Manifest | None = None, progress: Progress | None = None) -> list[Reach]:
-    """Reads and checks the release at `where`, stores it in the cache, and returns its reaches.
+def import_release(location: Path, manifest: Manifest | None = None, progress: Progress | None = None) -> list[Reach]:
+    """Reads and checks the release at `location`, stores it in the cache, and returns its reaches.
 
-    Raises ReleaseError where a file is not as published, OSError where the cache cannot be written.
+    Raises ReleaseError if a file differs from the published one, OSError if the cache cannot be written.
     """
     manifest = manifest or Manifest.load()
-    reaches = release.read(where, manifest, progress)
+    reaches = release.read(location, manifest, progress)
     _write(cache_file(), reaches, manifest)
     return reaches
 
 
 def load_reaches(manifest: Manifest | None = None) -> list[Reach]:
-    """The recorded reaches, sorted by name: from the cache, else from the release that DEXTRON_DATA names.
+    """The recorded reaches, sorted by name, from the cache or else from the release that DEXTRON_DATA names.
 
-    Raises MissingData where neither is there or the cache is damaged, ReleaseError as `import_release`.
+    Raises MissingData if neither can be read, ReleaseError as `import_release` does.
     """
     manifest = manifest or Manifest.load()
     cached, problem = _read(cache_file(), manifest)
     if cached is not None:
         return cached
-    if named := os.environ.get("DEXTRON_DATA"):
-        return release.read(Path(named).expanduser(), manifest)
+    if location := os.environ.get("DEXTRON_DATA"):
+        return release.read(Path(location).expanduser(), manifest)
     raise MissingData(problem)
 
 
 def _write(file: Path, reaches: Sequence[Reach], manifest: Manifest) -> None:
     columns = _columns(reaches)
-    marks = {"manifest": np.array(manifest.digest), "digest": np.array(_digest(columns, manifest))}
+    digests = {"manifest": np.array(manifest.digest), "digest": np.array(_digest(columns, manifest))}
     file.parent.mkdir(parents=True, exist_ok=True)
     descriptor, temporary = tempfile.mkstemp(prefix=f".{file.stem}-", suffix=".npz", dir=file.parent)
     try:
         with os.fdopen(descriptor, "wb") as stream:
-            np.savez(stream, allow_pickle=False, **columns, **marks)
+            np.savez(stream, allow_pickle=False, **columns, **digests)
             stream.flush()
             os.fsync(stream.fileno())
         os.replace(temporary, file)
@@ -97,7 +97,7 @@ def _write(file: Path, reaches: Sequence[Reach], manifest: Manifest) -> None:
 
 
 def _read(file: Path, manifest: Manifest) -> tuple[list[Reach] | None, str]:
-    """The reaches in a cache file, or None and what is wrong with it."""
+    """The reaches in a cache file, or None and the reason why there are none, as a phrase for MissingData."""
     try:
         with np.load(file, allow_pickle=False) as stored:
             if str(stored["manifest"]) != manifest.digest:
@@ -143,4 +143,4 @@ def _reaches(columns: dict[str, np.ndarray]) -> list[Reach]:
         columns["reached"].tolist(),
         strict=True,
     )
-    return [Reach(name, t, x, q, reached, *parsing.origin(name)) for name, t, x, q, reached in parts]
+    return [Reach(name, t, x, q, reached, *parsing.subject_and_region(name)) for name, t, x, q, reached in parts]

@@ -1,4 +1,4 @@
-"""Downloading the authors' public release of recorded reaches."""
+"""Downloads the authors' public release of recorded reaches."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from dextron_bench.reaches.recorded.cache import Progress, import_release
 from dextron_bench.reaches.recorded.release import Manifest
 
 RELEASE = "https://github.com/sharif1093/dextron/archive/a101b9e7e4b1ba3875c36eb555543b2bb7a79818.zip"
-LIMIT = 1_000_000_000  # [bytes] the whole repository with its meshes is well below.
+LIMIT = 1_000_000_000  # [bytes] well above the size of the whole repository with its meshes.
 CHUNK = 1 << 18
-TIMEOUT = 30.0  # [s] without a byte.
+TIMEOUT = 30.0  # [s] longest wait for the next bytes.
 
 
 class FetchError(RuntimeError):
@@ -30,9 +30,10 @@ class FetchError(RuntimeError):
 
 
 def fetch(manifest: Manifest | None = None, progress: Progress | None = None, url: str = RELEASE) -> list[Reach]:
-    """Downloads the release, imports it as `archive.import_release` does, and returns its reaches.
+    """Downloads the release, imports it as `cache.import_release` does, and returns its reaches.
 
-    `progress` hears of (bytes, all bytes or 0 where unknown). Raises FetchError, ReleaseError, OSError.
+    Calls `progress` with the number of bytes so far, and the total or 0 if the server does not report it. Raises
+    FetchError, ReleaseError or OSError.
     """
     with tempfile.TemporaryDirectory(prefix="dextron-bench-") as folder:
         file = Path(folder) / "release.zip"
@@ -42,13 +43,13 @@ def fetch(manifest: Manifest | None = None, progress: Progress | None = None, ur
 
 
 def download(url: str, target: IO[bytes], limit: int = LIMIT, progress: Progress | None = None) -> None:
-    """Copies what lies at `url` to `target`; raises FetchError, also beyond `limit` bytes."""
+    """Copies the content at `url` to `target`. Raises FetchError, also if it has more than `limit` bytes."""
     try:
         with urllib.request.urlopen(url, timeout=TIMEOUT) as response:
             if url.startswith("https:") and not response.url.startswith("https:"):
-                raise FetchError(url, "it leads to an address without encryption")
-            announced = int(response.headers.get("Content-Length") or 0)
-            _copy(url, response, target, limit, announced, progress)
+                raise FetchError(url, "it redirects to an address without encryption")
+            expected = int(response.headers.get("Content-Length") or 0)
+            _copy(url, response, target, limit, expected, progress)
     except urllib.error.HTTPError as error:
         raise FetchError(url, f"the server answers {error.code} {error.reason}") from error
     except urllib.error.URLError as error:
@@ -58,15 +59,15 @@ def download(url: str, target: IO[bytes], limit: int = LIMIT, progress: Progress
 
 
 def _copy(
-    url: str, response: IO[bytes], target: IO[bytes], limit: int, announced: int, progress: Progress | None
+    url: str, response: IO[bytes], target: IO[bytes], limit: int, expected: int, progress: Progress | None
 ) -> None:
     done = 0
     while chunk := response.read(CHUNK):
         done += len(chunk)
-        if done > limit or announced > limit:
+        if done > limit or expected > limit:
             raise FetchError(url, f"it has more than {limit} bytes")
         target.write(chunk)
         if progress:
-            progress(done, announced)
-    if done < announced:
-        raise FetchError(url, f"the connection broke after {done} of {announced} bytes")
+            progress(done, expected)
+    if done < expected:
+        raise FetchError(url, f"the connection broke after {done} of {expected} bytes")

@@ -1,7 +1,7 @@
-"""The authors' public release of recorded reaches: finding its files, checking them, reading them.
+"""Reads the authors' public release of recorded reaches, and checks every file of it.
 
-A release is their archive, a folder or a checkout. Only names of the manifest are ever looked for, nothing
-is unpacked, and no file counts before its SHA-256 is the published one.
+A release is their archive, a folder or a checkout. The reader opens only files that the manifest names, unpacks nothing
+to disk, and accepts a file only if its SHA-256 is the published one.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import parsing
 
 SHIPPED = Path(__file__).parents[2] / "data" / "real-manifest.json"
-MAX_FILE = 1_000_000  # [bytes] far above the largest recording (41 kB), far below what hurts.
-MAX_MEMBERS = 100_000  # Members of an archive; the authors' whole repository has a few thousand.
+MAX_FILE = 1_000_000  # [bytes] far above the largest recording (41 kB), and harmless in memory.
+MAX_MEMBERS = 100_000  # Most members of an archive; the authors' whole repository has a few thousand.
 MEMBER = re.compile(r"(?:[^/\\]+/)?(?:data/)?(extracts/(?:meta/)?\w+\.json)")
 
 Reader = Callable[[str], bytes]
 
 
 class ReleaseError(ValueError):
-    """A release that cannot be imported; the message names the file and says what is wrong with it."""
+    """A release cannot be imported; the message names the file and the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """What was published: SHA-256 of each file by its name from `extracts/` on, and of the list itself."""
+    """The published files: the SHA-256 of each, by its name from `extracts/` on, and that of the manifest itself."""
 
     files: dict[str, str]
     digest: str
@@ -47,107 +47,109 @@ class Manifest:
 
     @property
     def reaches(self) -> list[str]:
-        """Names of the reaches, sorted: draws depend on this order."""
+        """Names of the reaches, sorted, since random draws depend on their order."""
         return sorted(Path(file).stem for file in self.files if "/meta/" not in file)
 
 
-def read(where: Path, manifest: Manifest, progress: Callable[[int, int], None] | None = None) -> list[Reach]:
-    """All reaches of the release at `where`, in sorted order, each file checked against the manifest.
+def read(location: Path, manifest: Manifest, progress: Callable[[int, int], None] | None = None) -> list[Reach]:
+    """All reaches of the release at `location`, sorted by name, after a check of each file against the manifest.
 
-    `progress` hears of (done, all). Raises ReleaseError, and FileNotFoundError where there is nothing.
+    Calls `progress` with the numbers of reaches read and in all. Raises ReleaseError, and FileNotFoundError if
+    `location` does not exist.
     """
     names, reaches = manifest.reaches, []
-    with _opened(where, manifest) as reader:
+    with _open_reader(location, manifest) as reader:
         for name in names:
-            samples, notes = f"extracts/{name}.json", f"extracts/meta/{name}_meta.json"
+            files = f"extracts/{name}.json", f"extracts/meta/{name}_meta.json"
             try:
-                recording, marks = reader(samples), reader(notes)
-                reach = parsing.parse(name, recording, marks)
-            except parsing.RawError as error:
+                contents = {file: reader(file) for file in files}
+                reach = parsing.parse(name, *contents.values())
+            except parsing.RecordingError as error:
                 raise ReleaseError(str(error)) from error
-            _verify(manifest, {samples: recording, notes: marks})
+            _verify_hashes(manifest, contents)
             reaches.append(reach)
             if progress:
                 progress(len(reaches), len(names))
     return reaches
 
 
-def _verify(manifest: Manifest, files: dict[str, bytes]) -> None:
-    for file, content in files.items():
+def _verify_hashes(manifest: Manifest, contents: dict[str, bytes]) -> None:
+    for file, content in contents.items():
         if hashlib.sha256(content).hexdigest() != manifest.files[file]:
-            raise ReleaseError(f"{file}: its SHA-256 is not the published one; get the release again")
+            raise ReleaseError(f"{file}: its SHA-256 is not the published one; download the release again")
 
 
 @contextmanager
-def _opened(where: Path, manifest: Manifest) -> Iterator[Reader]:
-    if where.is_dir():
-        yield _folder(where, manifest)
+def _open_reader(location: Path, manifest: Manifest) -> Iterator[Reader]:
+    """A function from a file's name to its content, while the release at `location` is open."""
+    if location.is_dir():
+        yield _folder_reader(location, manifest)
         return
-    if not where.exists():
-        raise FileNotFoundError(f"{where} does not exist")
+    if not location.exists():
+        raise FileNotFoundError(f"{location} does not exist")
     try:
-        with zipfile.ZipFile(where) as archive:
-            yield _archive(archive, where, manifest)
+        with zipfile.ZipFile(location) as archive:
+            yield _zip_reader(archive, location, manifest)
     except zipfile.BadZipFile as error:
-        raise ReleaseError(f"{where} is not a sound zip file: {error}") from error
+        raise ReleaseError(f"{location} is not a valid zip file: {error}") from error
 
 
-def _folder(where: Path, manifest: Manifest) -> Reader:
-    homes = [where / "data", where, *sorted(where.glob("dextron-*/data"))]
-    if where.resolve().name == "extracts":
-        homes.append(where.resolve().parent)
-    home = next((home for home in homes if (home / "extracts" / "meta").is_dir()), None)
-    if home is None:
-        raise ReleaseError(f"{where} has no data/extracts/meta; name the release's top folder, data or extracts")
-    _complete({file for file in manifest.files if (home / file).is_file()}, where, manifest)
+def _folder_reader(folder: Path, manifest: Manifest) -> Reader:
+    candidates = [folder / "data", folder, *sorted(folder.glob("dextron-*/data"))]
+    if folder.resolve().name == "extracts":
+        candidates.append(folder.resolve().parent)
+    root = next((candidate for candidate in candidates if (candidate / "extracts" / "meta").is_dir()), None)
+    if root is None:
+        raise ReleaseError(f"{folder} has no data/extracts/meta; name the release's top folder, data or extracts")
+    _check_complete({file for file in manifest.files if (root / file).is_file()}, folder, manifest)
 
     def reader(file: str) -> bytes:
-        with open(home / file, "rb") as stream:
-            return _limited(file, stream.read(MAX_FILE + 1))
+        with open(root / file, "rb") as stream:
+            return _size_checked(file, stream.read(MAX_FILE + 1))
 
     return reader
 
 
-def _archive(archive: zipfile.ZipFile, where: Path, manifest: Manifest) -> Reader:
+def _zip_reader(archive: zipfile.ZipFile, location: Path, manifest: Manifest) -> Reader:
     members: dict[str, zipfile.ZipInfo] = {}
     if len(archive.infolist()) > MAX_MEMBERS:
-        raise ReleaseError(f"{where} has more than {MAX_MEMBERS} members; this is not the authors' release")
+        raise ReleaseError(f"{location} has more than {MAX_MEMBERS} members; this is not the authors' release")
     for info in archive.infolist():
         match = MEMBER.fullmatch(info.filename)
         if match and match[1] in manifest.files:
-            _plain(match[1], info, members)
+            _check_member(match[1], info, members)
             members[match[1]] = info
-    _complete(members.keys(), where, manifest)
+    _check_complete(members.keys(), location, manifest)
 
     def reader(file: str) -> bytes:
         try:
             with archive.open(members[file]) as stream:
-                return _limited(file, stream.read(MAX_FILE + 1))
+                return _size_checked(file, stream.read(MAX_FILE + 1))
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
-            raise ReleaseError(f"{file}: cannot be read from {where}: {error}") from error
+            raise ReleaseError(f"{file}: cannot be read from {location}: {error}") from error
 
     return reader
 
 
-def _plain(file: str, info: zipfile.ZipInfo, seen: dict[str, zipfile.ZipInfo]) -> None:
-    """Refuses what a published file never is."""
-    if file in seen:
-        raise ReleaseError(f"{file}: the archive has it twice ({seen[file].filename}, {info.filename})")
+def _check_member(file: str, info: zipfile.ZipInfo, members: dict[str, zipfile.ZipInfo]) -> None:
+    """Refuses duplicates, symbolic links, encrypted members and large ones; the release has none of these."""
+    if file in members:
+        raise ReleaseError(f"{file}: the archive has it twice ({members[file].filename}, {info.filename})")
     if stat.S_ISLNK(info.external_attr >> 16):
         raise ReleaseError(f"{file}: is a symbolic link in the archive")
     if info.flag_bits & 1:
         raise ReleaseError(f"{file}: is encrypted in the archive")
     if info.file_size > MAX_FILE:
-        raise ReleaseError(f"{file}: unpacks to {info.file_size} bytes; none has more than {MAX_FILE}")
+        raise ReleaseError(f"{file}: unpacks to {info.file_size} bytes; the limit is {MAX_FILE}")
 
 
-def _limited(file: str, content: bytes) -> bytes:
+def _size_checked(file: str, content: bytes) -> bytes:
     if len(content) > MAX_FILE:
-        raise ReleaseError(f"{file}: has more than {MAX_FILE} bytes; none of the release has")
+        raise ReleaseError(f"{file}: has more than {MAX_FILE} bytes, the limit")
     return content
 
 
-def _complete(found: Iterable[str], where: Path, manifest: Manifest) -> None:
-    missing = sorted(manifest.files.keys() - set(found))
+def _check_complete(files: Iterable[str], location: Path, manifest: Manifest) -> None:
+    missing = sorted(manifest.files.keys() - set(files))
     if missing:
-        raise ReleaseError(f"{where} lacks {len(missing)} of {len(manifest.files)} files, first {missing[0]}")
+        raise ReleaseError(f"{location} lacks {len(missing)} of {len(manifest.files)} files, first {missing[0]}")
