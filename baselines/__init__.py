@@ -1,1 +1,1 @@
-"""The paper's baselines and the floors, one file a method, written as an outside entrant would."""
+"""The baselines of the paper and the floors, one file per method, written as an outside entrant writes them."""

@@ -1,4 +1,4 @@
-"""BC: the policy's network fitted to what experts did, with no world to try it in (paper, II.D)."""
+"""BC: fits the policy's network to the actions of experts, without simulation (paper, II.D)."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from dextron_bench.methods.learners import Arrays
 BATCH = 512  # Table II.
 LEARNING_RATE = 1e-3
 HALVED_EVERY = 100  # Epochs.
-STEPS = 100  # Updates in an epoch; the paper does not say.
+STEPS = 100  # Updates in an epoch; the paper gives no number.
 
 
 def imitation_loss(mean: Tensor, actions: Tensor) -> Tensor:
-    """Mean squared error of each agent's own actions, the tanh of the mean; (S,) from (S, B, 1)."""
+    """Mean squared error (S,) of each agent's actions, tanh(mean), for means and expert actions (S, B, 1)."""
     return (mean.tanh() - actions).square().mean(dim=(1, 2))
 
 
@@ -37,23 +37,23 @@ class Bc(Scheduled):
 
     @property
     def demonstrated(self) -> int:
-        """Expert transitions in each batch: all."""
+        """Expert transitions in each batch: all of them."""
         return BATCH
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
-        """One network a seed, side by side."""
+        """A trainer with one network per seed, all trained together."""
         schedule = SCHEDULES[self.preset]
         return Cloning(demonstrations.load(track, schedule.episodes), seeds, track.device)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
-        """Plays the network's output."""
+        """The agent that plays the network's output."""
         return MeanAgent(weights)
 
 
 class Cloning:
-    """The regression of S networks on demonstrations; a `learning.Trainer`.
+    """The Trainer of BC: fits S networks to demonstrations.
 
-    A network has the policy's shape, so its second output is there and unused.
+    The networks have the shape of the learners' policies, so each has a second output, which is not used.
     """
 
     def __init__(self, demos: demonstrations.Demonstrations, seeds: Sequence[int], device: str = "cpu") -> None:
@@ -69,7 +69,7 @@ class Cloning:
         self._optimiser = torch.optim.Adam(self._network.parameters, lr=LEARNING_RATE, fused=True)
 
     def advance(self) -> list[dict[str, float]]:
-        """One epoch of STEPS updates; notes the mean loss."""
+        """Trains for one epoch of STEPS updates; returns each seed's mean loss."""
         for group in self._optimiser.param_groups:
             group["lr"] = LEARNING_RATE * 0.5 ** (self.epoch // HALVED_EVERY)
         size = (STEPS, BATCH)
@@ -89,20 +89,20 @@ class Cloning:
         return losses.detach()
 
     def weights(self) -> list[Arrays]:
-        """Of each seed: the network's layers, and `mean` and `deviation` of states."""
+        """The network's layers, and `mean` and `deviation` of states, for each seed."""
         layers = [parameter.detach().cpu().numpy() for parameter in self._network.parameters]
         scale = {"mean": self._mean, "deviation": self._deviation}
         return [{f"policy.{i}": a[k].copy() for i, a in enumerate(layers)} | scale for k in range(len(self._seeds))]
 
     def state(self) -> Arrays:
-        """Networks and optimiser."""
+        """Networks, optimiser and epoch."""
         return snapshot.save(self._network.parameters, self._optimiser) | {"epoch": np.array([self.epoch])}
 
     def journal(self) -> Arrays:
-        """Nothing: the demonstrations are the same at any time."""
+        """Empty: BC gathers no experience, and its demonstrations do not change."""
         return {}
 
     def restore(self, state: Arrays, journals: Iterable[Arrays]) -> None:
-        """Takes the place of the trainer that gave the state."""
+        """Continues from another trainer's `state`."""
         snapshot.load(self._network.parameters, self._optimiser, state)
         self.epoch = int(state["epoch"][0])

@@ -1,4 +1,7 @@
-"""The paper's cycle: one step of the agent, one of an expert, one update; S seeds side by side."""
+"""The training loop of the paper: one agent step, one expert step, one update; S seeds train together.
+
+The file is longer than 200 lines because one class holds the whole state of a training that can be resumed exactly.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +24,14 @@ from dextron_bench.world.engine import Engine
 CAPACITY = 1_000_000  # Transitions in either buffer (table II).
 FRAMES = 1000  # Control steps of the agent in an epoch.
 
-NETWORKS, EPISODES, DEMONSTRATIONS, ACTING, BLIND, PICKS, NOISE = range(7)  # Streams of random numbers of a seed.
+NETWORKS, EPISODES, DEMONSTRATIONS, ACTING, WARM_START, PICKS, NOISE = range(7)  # The random streams of each seed.
 
 
 class Cycle:
-    """The training of S agents by SAC, each batch with a share of demonstrations; a `learning.Trainer`."""
+    """The Trainer of RL and RLIL: trains S agents by SAC; each batch has a share of demonstrations."""
 
     def __init__(self, track: Track, seeds: Sequence[int], schedule: Schedule, demonstrated: int) -> None:
-        """Trains one agent a seed; `demonstrated` of the BATCH transitions of each update are an expert's."""
+        """Trains one agent per seed; `demonstrated` of the BATCH transitions in each update come from experts."""
         self.epoch = 0
         self._track, self._seeds, self._schedule = track, list(seeds), schedule
         self._demonstrated, self._frames = demonstrated, 0
@@ -40,7 +43,7 @@ class Cycle:
         self._engine = Engine(agents, track.threads)
         self._episodes = np.zeros(agents, int)
         self._score = np.zeros(agents)
-        self._lived: list[tuple[Transitions, np.ndarray]] = []
+        self._recent: list[tuple[Transitions, np.ndarray]] = []
         if demonstrated:
             self._demos = demonstrations.load(track, schedule.episodes)
             length = schedule.epochs * FRAMES
@@ -48,22 +51,22 @@ class Cycle:
         self._now = self._begin(self._ids)
 
     def advance(self) -> list[dict[str, float]]:
-        """One epoch of FRAMES cycles; notes losses, and the agents' own episodes and their mean sum of rewards."""
-        acting, blind = self._normal(ACTING, 1), self._uniform(BLIND, 1) * 2.0 - 1.0
+        """Trains for FRAMES cycles; returns each seed's losses, number of finished episodes and their mean return."""
+        acting, random = self._normal(ACTING, 1), self._uniform(WARM_START, 1) * 2.0 - 1.0
         picks = self._uniform(PICKS, BATCH)
         noise = torch.tensor(self._normal(NOISE, BATCH)[..., None], dtype=torch.float32, device=self._track.device)
         losses: list[Tensor] = []
         scores: list[list[float]] = [[] for _ in self._seeds]
         for t in range(FRAMES):
-            warm = self._frames >= self._schedule.warm_start
-            self._live(self._act(acting[t]) if warm else blind[t], scores)
-            if warm:
+            is_warm = self._frames >= self._schedule.warm_start
+            self._step(self._act(acting[t]) if is_warm else random[t], scores)
+            if is_warm:
                 losses.append(self._sac.update(self._batch(picks[t]), noise[t]))
         self.epoch += 1
-        return self._notes(losses, scores)
+        return self._metrics(losses, scores)
 
     def weights(self) -> list[Arrays]:
-        """Of each seed: the policy's layers, and `mean` and `deviation` of states."""
+        """The policy's layers, and `mean` and `deviation` of states, for each seed."""
         layers = [parameter.detach().cpu().numpy() for parameter in self._sac.policy.parameters]
         return [
             {f"policy.{i}": layer[k].copy() for i, layer in enumerate(layers)}
@@ -72,25 +75,25 @@ class Cycle:
         ]
 
     def state(self) -> Arrays:
-        """Networks, optimiser, scales, and the episodes under way."""
-        found = {name: array.copy() for name, array in self._arrays().items()}
-        found |= {f"sac.{name}": array for name, array in self._sac.save().items()}
-        found |= {f"engine.{name}": array for name, array in self._engine.save(self._ids).items()}
-        return found | {"done": np.array([self.epoch, self._frames])}
+        """Networks, optimiser, scales, and the current episodes."""
+        arrays = {name: array.copy() for name, array in self._arrays().items()}
+        arrays |= {f"sac.{name}": array for name, array in self._sac.save().items()}
+        arrays |= {f"engine.{name}": array for name, array in self._engine.save(self._ids).items()}
+        return arrays | {"done": np.array([self.epoch, self._frames])}
 
     def journal(self) -> Arrays:
-        """The agents' transitions since the last one; next states only where no later row has them."""
-        if not self._lived:
+        """Transitions since the last journal; a next state is stored only if it is not the state of the next row."""
+        if not self._recent:
             return {}
-        lived = Transitions(*(np.stack(part) for part in zip(*(each for each, _ in self._lived), strict=True)))
-        ended = np.stack([ended for _, ended in self._lived])
-        self._lived.clear()
-        found = lived._asdict() | {"terminated": lived.terminated.astype(np.uint8), "ended": ended.astype(np.uint8)}
-        del found["nexts"]
-        return found | {"finals": lived.nexts[ended], "last": lived.nexts[-1]}
+        steps = Transitions(*(np.stack(part) for part in zip(*(step for step, _ in self._recent), strict=True)))
+        ended = np.stack([ended for _, ended in self._recent])
+        self._recent.clear()
+        arrays = steps._asdict() | {"terminated": steps.terminated.astype(np.uint8), "ended": ended.astype(np.uint8)}
+        del arrays["nexts"]
+        return arrays | {"finals": steps.nexts[ended], "last": steps.nexts[-1]}
 
     def restore(self, state: Arrays, journals: Iterable[Arrays]) -> None:
-        """Takes the place of the trainer that gave state and journals; the buffer is filled again as it was."""
+        """Continues from another trainer's `state`; fills the replay buffer again from its journals."""
         for name, array in self._arrays().items():
             array[...] = state[name]
         self._sac.load({name.removeprefix("sac."): array for name, array in state.items() if name.startswith("sac.")})
@@ -104,35 +107,35 @@ class Cycle:
         )
         self.epoch, self._frames = (int(number) for number in state["done"])
         for journal in journals:
-            self._relive(journal)
-        self._lived.clear()
+            self._add_journal(journal)
+        self._recent.clear()
 
-    def _relive(self, journal: Arrays) -> None:
+    def _add_journal(self, journal: Arrays) -> None:
         terminated, ended = journal["terminated"].astype(bool), journal["ended"].astype(bool)
         nexts = np.concatenate([journal["states"][1:], journal["last"][None]])
         nexts[ended] = journal["finals"]
-        lived = Transitions(journal["states"], journal["actions"], journal["rewards"], nexts, terminated)
+        steps = Transitions(journal["states"], journal["actions"], journal["rewards"], nexts, terminated)
         for t in range(len(ended)):
-            self._replay.add(Transitions(*(part[t] for part in lived)), ended[t])
+            self._replay.add(Transitions(*(part[t] for part in steps)), ended[t])
 
     def _arrays(self) -> Arrays:
-        """What training changes in place, by name."""
+        """The arrays that training changes in place, by name."""
         scales = {"states": self._states, "rewards": self._rewards}
-        found = {f"{of}.{name}": array for of, moments in scales.items() for name, array in vars(moments).items()}
-        return found | {"now": self._now, "score": self._score, "episodes": self._episodes}
+        arrays = {f"{key}.{name}": array for key, moments in scales.items() for name, array in vars(moments).items()}
+        return arrays | {"now": self._now, "score": self._score, "episodes": self._episodes}
 
-    def _live(self, actions: np.ndarray, scores: list[list[float]]) -> None:
-        """Plays actions (S, 1) and keeps what came of them; notes the scores of episodes that ended."""
-        self._states.see(self._now)
+    def _step(self, actions: np.ndarray, scores: list[list[float]]) -> None:
+        """Plays actions (S, 1) and stores the transitions; adds the returns of finished episodes to `scores`."""
+        self._states.update(self._now)
         step = self._engine.step(self._ids, actions)
         ended = step.ended
-        self._rewards.see(step.rewards[:, None])
+        self._rewards.update(step.rewards[:, None])
         before, taken, rewards, after = (
             array.astype(np.float32) for array in (self._now, actions[:, 0], step.rewards, step.states)
         )
-        lived = Transitions(before, taken, rewards, after, step.terminated)
-        self._replay.add(lived, ended)
-        self._lived.append((lived, ended))
+        transitions = Transitions(before, taken, rewards, after, step.terminated)
+        self._replay.add(transitions, ended)
+        self._recent.append((transitions, ended))
         self._frames += 1
         self._score += step.rewards
         self._now[:] = step.states
@@ -143,27 +146,27 @@ class Cycle:
             self._now[ended] = self._begin(self._ids[ended])
 
     def _begin(self, agents: np.ndarray) -> np.ndarray:
-        """Starts the next episode of each of `agents` (n,); returns first states (n, 48)."""
+        """Starts the next episode of each agent of `agents` (n,); returns the first states (n, 48)."""
         cases = [self._case(int(k), int(self._episodes[k])) for k in agents]
         self._episodes[agents] += 1
         return self._engine.begin(agents, [self._track.source.path(case.setting) for case in cases])
 
     def _case(self, agent: int, episode: int) -> Case:
-        """What an agent's episode of that number is played on."""
+        """The case of an agent's episode, by its number."""
         rng = self._rng(self._seeds[agent], EPISODES, episode)
         return self._track.cases[int(rng.integers(len(self._track.cases)))]
 
     def _act(self, noise: np.ndarray) -> np.ndarray:
-        """Sampled actions (S, 1) in the states that are now."""
+        """Sampled actions (S, 1) in the current states."""
         scaled = np.clip((self._now - self._states.mean) / self._states.deviation, -CLIP, CLIP)
         states, noise_now = (self._tensor(array)[:, None] for array in (scaled, noise))
         return self._sac.act(states, noise_now)[:, 0].double().cpu().numpy()
 
     def _batch(self, uniform: np.ndarray) -> Batch:
-        """The scaled transitions that numbers (S, BATCH) in [0, 1) point at, demonstrations first."""
-        parts = self._replay.pick(uniform[:, self._demonstrated :])
+        """The scaled transitions that numbers (S, BATCH) in [0, 1) select; demonstrations come first."""
+        parts = self._replay.select(uniform[:, self._demonstrated :])
         if self._demonstrated:
-            demos = self._pick_demonstrations(uniform[:, : self._demonstrated])
+            demos = self._select_demonstrations(uniform[:, : self._demonstrated])
             parts = Transitions(*(np.concatenate(pair, axis=1) for pair in zip(demos, parts, strict=True)))
         scale = self._states.mean, self._states.deviation
         mean, deviation = (array[:, None].astype(np.float32) for array in scale)
@@ -174,8 +177,8 @@ class Cycle:
         actions, rewards, alive = (self._tensor(array)[..., None] for array in columns)
         return Batch(scaled[:, :BATCH], actions, rewards, scaled[:, BATCH:], alive)
 
-    def _pick_demonstrations(self, uniform: np.ndarray) -> Transitions:
-        """As `Replay.pick`, of the demonstrations that have come by so far."""
+    def _select_demonstrations(self, uniform: np.ndarray) -> Transitions:
+        """Like `Replay.select`, from the demonstrations streamed so far."""
         oldest = max(self._frames - CAPACITY, 0)
         place = oldest + (uniform * (self._frames - oldest)).astype(int)
         rows = self._stream[self._ids[:, None], place]
@@ -183,15 +186,16 @@ class Cycle:
         never = np.zeros(rows.shape, bool)
         return Transitions(demos.states[rows], demos.actions[rows], demos.rewards[rows], demos.states[rows + 1], never)
 
-    def _notes(self, losses: list[Tensor], scores: list[list[float]]) -> list[dict[str, float]]:
-        notes: list[dict[str, float]] = [{"frames": self._frames, "episodes": len(of)} for of in scores]
-        for note, of in zip(notes, scores, strict=True):
-            note |= {"score": float(np.mean(of))} if of else {}
+    def _metrics(self, losses: list[Tensor], scores: list[list[float]]) -> list[dict[str, float]]:
+        metrics: list[dict[str, float]] = [{"frames": self._frames, "episodes": len(returns)} for returns in scores]
+        for values, returns in zip(metrics, scores, strict=True):
+            values |= {"score": float(np.mean(returns))} if returns else {}
         if losses:
             means = torch.stack(losses).mean(dim=0).double().cpu().numpy()
-            for k, note in enumerate(notes):
-                note |= dict(zip(("action_value_loss", "value_loss", "policy_loss"), means[:, k].tolist(), strict=True))
-        return notes
+            names = ("action_value_loss", "value_loss", "policy_loss")
+            for k, values in enumerate(metrics):
+                values |= dict(zip(names, means[:, k].tolist(), strict=True))
+        return metrics
 
     def _tensor(self, array: np.ndarray) -> Tensor:
         return torch.tensor(array, dtype=torch.float32, device=self._track.device)
@@ -200,11 +204,11 @@ class Cycle:
         return np.random.default_rng([seed, *stream])
 
     def _uniform(self, stream: int, width: int) -> np.ndarray:
-        """This epoch's numbers in [0, 1), (FRAMES, S, width), from a stream of each seed."""
+        """Uniform numbers (FRAMES, S, width) in [0, 1) for this epoch, from one stream of each seed."""
         draws = [self._rng(seed, stream, self.epoch).random((FRAMES, width)) for seed in self._seeds]
         return np.stack(draws, axis=1)
 
     def _normal(self, stream: int, width: int) -> np.ndarray:
-        """As `_uniform`, standard normal."""
+        """Standard normal numbers (FRAMES, S, width) for this epoch, from one stream of each seed."""
         draws = [self._rng(seed, stream, self.epoch).standard_normal((FRAMES, width)) for seed in self._seeds]
         return np.stack(draws, axis=1)

@@ -1,4 +1,4 @@
-"""Expert episodes, played once, kept in a cache, and streamed in an order that each seed draws for itself."""
+"""Expert episodes: played once, stored in a cache, and streamed in an order that each seed draws."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from dextron_bench import Case, ExpertAgent, Track, rollout
 from dextron_bench.storage import atomic, hashing
 from dextron_bench.world import model
 
-FORMAT = 1  # Of the cached file.
+FORMAT = 1  # Version of the cached file.
 
 
 @dataclass(frozen=True, slots=True)
 class Demonstrations:
     """Episodes of experts, one after the other: states (R, 48), actions (R,), rewards (R,), float32.
 
-    Episode k has the rows from `starts[k]` to `starts[k + 1]`, of which the last is its last state alone. No expert
-    lets the bottle fall, so no demonstration terminates.
+    Episode k has the rows from `starts[k]` to `starts[k + 1]`; its last row holds only its last state. No expert lets
+    the bottle fall, so no demonstration terminates.
     """
 
     states: np.ndarray
@@ -36,7 +36,7 @@ class Demonstrations:
         return np.delete(np.arange(len(self.states)), self.starts[1:] - 1)
 
     def stream(self, rng: np.random.Generator, length: int) -> np.ndarray:
-        """Rows (length,) that begin a transition, as whole episodes drawn with replacement bring them."""
+        """Rows (length,) that begin a transition, from whole episodes that are drawn with replacement."""
         steps = np.diff(self.starts) - 1
         drawn = rng.integers(len(self), size=length // int(steps.min()) + 1)
         ends = steps[drawn].cumsum()
@@ -46,18 +46,17 @@ class Demonstrations:
 
 
 def load(track: Track, episodes: int | None = None) -> Demonstrations:
-    """The experts' episodes in the first so many cases of a track (all by default), played or from the cache."""
+    """The experts' episodes on the first `episodes` cases of a track (default: all), played or from the cache."""
     cases = track.cases[:episodes]
     file = track.cache / f"demonstrations-{_digest(cases)[:16]}.safetensors"
     if not file.exists():
-        made = play(track, cases)
-        atomic.write_atomically(file, lambda part: save_file(made, part))
-    found = load_file(file)
-    return Demonstrations(**found)
+        arrays = play(track, cases)
+        atomic.write_atomically(file, lambda part: save_file(arrays, part))
+    return Demonstrations(**load_file(file))
 
 
 def play(track: Track, cases: Sequence[Case]) -> dict[str, np.ndarray]:
-    """The arrays of `Demonstrations` from the experts' own rollouts of cases."""
+    """The arrays of `Demonstrations`, from rollouts of each case's expert."""
     played = dict(rollout(ExpertAgent(), track.source, cases, threads=track.threads))
     episodes = [played[k] for k in range(len(cases))]
     lengths = [len(episode.states) for episode in episodes]
@@ -70,5 +69,5 @@ def play(track: Track, cases: Sequence[Case]) -> dict[str, np.ndarray]:
 
 
 def _digest(cases: Sequence[Case]) -> str:
-    """SHA-256 of what the episodes depend on."""
+    """SHA-256 of everything that the episodes depend on."""
     return hashing.digest(f"{FORMAT} {model.mjcf_hash()}".encode(), *(repr(case).encode() for case in cases))

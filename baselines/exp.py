@@ -1,4 +1,4 @@
-"""EXP: each setting's own expert, told to it. No method can know this; it is the ceiling, not an entrant."""
+"""EXP: plays each setting's expert. No method can know the expert, so EXP is the ceiling, not an entrant."""
 
 from __future__ import annotations
 
@@ -15,5 +15,5 @@ class Exp:
     name: ClassVar[str] = "exp"
 
     def agent(self, seed: int) -> ExpertAgent:
-        """The same for every seed: experts are deterministic."""
+        """The agent, the same for every seed: experts are deterministic."""
         return ExpertAgent()

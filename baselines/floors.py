@@ -1,4 +1,4 @@
-"""Floors: what no effort and blind effort score."""
+"""Floors: the scores of no action and of random actions."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from typing import ClassVar
 import numpy as np
 
 
-class _Still:
-    """Sends 0 always."""
+class _ZeroAgent:
+    """Always sends 0."""
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Has no memory."""
+        """Does nothing: the agent has no memory."""
 
     def act(self, states: np.ndarray) -> np.ndarray:
         """Zeros (N, 1) for states (N, 48)."""
         return np.zeros((len(states), 1))
 
 
-class _Dice:
+class _NoiseAgent:
     """Sends uniform noise from one generator."""
 
     def __init__(self, seed: int) -> None:
         self._rng = np.random.default_rng(seed)
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Has no memory."""
+        """Does nothing: the agent has no memory."""
 
     def act(self, states: np.ndarray) -> np.ndarray:
         """Uniform actions (N, 1) in [-1, 1] for states (N, 48)."""
@@ -39,9 +39,9 @@ class Nothing:
 
     name: ClassVar[str] = "nothing"
 
-    def agent(self, seed: int) -> _Still:
-        """The same for every seed."""
-        return _Still()
+    def agent(self, seed: int) -> _ZeroAgent:
+        """The agent, the same for every seed."""
+        return _ZeroAgent()
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,6 @@ class Random:
 
     name: ClassVar[str] = "random"
 
-    def agent(self, seed: int) -> _Dice:
-        """A stream of its own for every seed."""
-        return _Dice(seed)
+    def agent(self, seed: int) -> _NoiseAgent:
+        """An agent with its own random stream for every seed."""
+        return _NoiseAgent(seed)

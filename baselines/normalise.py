@@ -1,24 +1,24 @@
-"""Running means and variances by which states and rewards are scaled."""
+"""Running means and variances that scale states and rewards."""
 
 from __future__ import annotations
 
 import numpy as np
 
-CLIP = 10.0  # Scaled states and rewards are clipped to this far from 0.
+CLIP = 10.0  # Scaled states and rewards are clipped to [-CLIP, CLIP].
 EPSILON = 1e-8
-PRIOR = 1e-4  # Observations that the first mean, 0, and variance, 1, count for.
+PRIOR = 1e-4  # The initial mean 0 and variance 1 count as so many observations.
 
 
 class Moments:
-    """Mean and variance of a stream of vectors, one stream for each of S agents."""
+    """Mean and variance of a stream of vectors, with one stream for each of S agents."""
 
     def __init__(self, agents: int, size: int) -> None:
         self.count = np.full((agents, 1), PRIOR)
         self.mean = np.zeros((agents, size))
         self.variance = np.ones((agents, size))
 
-    def see(self, values: np.ndarray) -> None:
-        """Takes in one vector for each agent, (S, size)."""
+    def update(self, values: np.ndarray) -> None:
+        """Adds one vector per agent, (S, size), to the streams."""
         delta = values - self.mean
         self.mean += delta / (self.count + 1.0)
         self.variance += (delta * (values - self.mean) - self.variance) / (self.count + 1.0)

@@ -1,4 +1,4 @@
-"""The policy of the paper's learners: a Gaussian squashed by tanh, and the agent that plays its mean."""
+"""The policy of the paper's learners: a Gaussian followed by tanh; and the agent that plays its mean."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ LOG_STD = (-20.0, 2.0)
 
 
 def head(outputs: Tensor) -> tuple[Tensor, Tensor]:
-    """Mean and logarithm of the deviation, each (S, B, 1), of a policy network's outputs (S, B, 2)."""
+    """Mean and logarithm of the standard deviation, each (S, B, 1), from a policy network's outputs (S, B, 2)."""
     mean, log_std = outputs.split(1, dim=-1)
     return mean, log_std.clamp(*LOG_STD)
 
 
 def sample(mean: Tensor, log_std: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
-    """Actions in (-1, 1) and their log probabilities, for standard normal noise; all (S, B, 1)."""
+    """Actions in (-1, 1) and their log densities, for standard normal noise; all (S, B, 1)."""
     raw = mean + log_std.exp() * noise
     return raw.tanh(), log_probability(raw, log_std, noise)
 
 
 def log_probability(raw: Tensor, log_std: Tensor, noise: Tensor) -> Tensor:
-    """Log density of tanh(raw), where raw lies `noise` deviations from its mean.
+    """Log density of tanh(raw), if raw lies `noise` standard deviations from its mean.
 
-    With log(1 - tanh(u)^2) = 2 (log 2 - u - softplus(-2 u)), exact where tanh has long rounded to 1.
+    Uses log(1 - tanh(u)^2) = 2 (log 2 - u - softplus(-2 u)), which stays exact when tanh(u) rounds to 1.
     """
     gaussian = -0.5 * noise.square() - log_std - 0.5 * math.log(2.0 * math.pi)
     return gaussian - 2.0 * (math.log(2.0) - raw - softplus(-2.0 * raw))
 
 
 class MeanAgent:
-    """Plays the tanh of the mean: the deterministic policy of one seed's weights, the same at any batch size."""
+    """Plays tanh(mean), the deterministic policy of one seed's weights; the actions do not depend on the batch size."""
 
     def __init__(self, weights: Mapping[str, np.ndarray]) -> None:
         """Takes `mean` and `deviation` (48,) of states, and the policy's layers as `policy.0`, `policy.1`, ..."""
@@ -48,7 +48,7 @@ class MeanAgent:
         self._network = Perceptron(list(zip(layers[::2], layers[1::2], strict=True)))
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Has no memory."""
+        """Does nothing: the agent has no memory."""
 
     def act(self, states: np.ndarray) -> np.ndarray:
         """Closing speeds (N, 1) for states (N, 48)."""

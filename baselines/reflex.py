@@ -1,4 +1,4 @@
-"""REFLEX: opens while the hand is far from the bottle and closes when it is near; nothing is learned."""
+"""REFLEX: opens while the hand is far from the bottle and closes when it is near; it learns nothing."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ class Reflex:
     name: ClassVar[str] = "reflex"
 
     near: float = 0.06
-    """From the palm's centre to the bottle [m]; the best of 0.05, 0.06 and 0.08 on `val` of `real`."""
+    """Distance from the palm's centre to the bottle [m]; 0.06 is the best of 0.05, 0.06 and 0.08 on `val` of `real`."""
 
     def __post_init__(self) -> None:
         if not self.near >= 0.0:
             raise BadDistance(f"--near is {self.near:g}; a distance is 0 or more")
 
     def agent(self, seed: int) -> Reflex:
-        """Itself: it has no memory, and is the same for every seed."""
+        """This object: it has no memory, and it is the same for every seed."""
         return self
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Has no memory."""
+        """Does nothing: the agent has no memory."""
 
     def act(self, states: np.ndarray) -> np.ndarray:
         """Actions (N, 1), -1 or 1, for states (N, 48)."""

@@ -16,14 +16,14 @@ from dextron_bench import Track, Trainer
 
 @dataclass(frozen=True)
 class Rl(Scheduled):
-    """SAC that learns from its own episodes alone (paper, fig. 4a, "RL")."""
+    """SAC that learns only from its own episodes (paper, fig. 4a, "RL")."""
 
     name: ClassVar[str] = "rl"
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
-        """One SAC agent a seed, side by side."""
+        """A trainer with one SAC agent per seed, all trained together."""
         return Cycle(track, seeds, SCHEDULES[self.preset], self.demonstrated)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
-        """Plays the policy's mean."""
+        """The agent that plays the policy's mean."""
         return MeanAgent(weights)

@@ -15,12 +15,12 @@ class BadShare(ValueError):
 
 @dataclass(frozen=True)
 class Rlil(Rl):
-    """SAC guided by demonstrations, a share of each batch (paper, fig. 4a, "RLIL 0.1" and "RLIL 0.3")."""
+    """SAC with a share of demonstrations in each batch (paper, fig. 4a, "RLIL 0.1" and "RLIL 0.3")."""
 
     name: ClassVar[str] = "rlil"
 
     dur: float = 0.1
-    """Demo-use ratio: the share of each batch that experts lived through, 0 to 1."""
+    """Demo-use ratio: the share of expert transitions in each batch, 0 to 1."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.dur <= 1.0:
@@ -28,10 +28,10 @@ class Rlil(Rl):
 
     @property
     def stem(self) -> str:
-        """Tells demo-use ratios apart, as "rlil-0.1" does."""
+        """The name with the demo-use ratio, such as "rlil-0.1"."""
         return f"{self.name}-{self.dur:g}"
 
     @property
     def demonstrated(self) -> int:
-        """Expert transitions in each batch: int(DUR x 32), as the paper's code has it."""
+        """Expert transitions in each batch: int(DUR x 32), as in the paper's code."""
         return int(self.dur * BATCH)

@@ -1,7 +1,7 @@
 """Soft actor-critic, first version, for S agents at once (Haarnoja et al., 2018): one Q, one V, one policy.
 
-The paper's authors wrote the policy's loss with a likelihood ratio whose gradient is not that of the objective;
-here the gradient goes through the action, as the method's own authors derive it.
+The paper's authors compute the policy's loss with a likelihood ratio, but its gradient is not the gradient of the
+objective. Here the gradient goes through the action, as the authors of soft actor-critic derive it.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ LEARNING_RATE = 3e-4  # Table II.
 POLYAK = 0.01
 DISCOUNT = 0.99
 BATCH = 32
-PENALTY = 1e-3  # On the squares of the policy's mean and logarithm of deviation.
+PENALTY = 1e-3  # Weight of the squares of the policy's mean and logarithm of the deviation.
 
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Scaled transitions, float32: states and nexts (S, B, 48); actions, rewards and alive (S, B, 1).
+    """Scaled transitions, float32: states and next states `nexts` (S, B, 48); actions, rewards, alive (S, B, 1).
 
-    `alive` is 0 where the bottle fell and 1 else: an episode that was only cut off is worth what would have followed.
+    `alive` is 0 if the bottle fell, else 1: the value of the next state counts also when the episode was truncated.
     """
 
     states: Tensor
@@ -38,40 +38,40 @@ class Batch:
 
 
 def action_value_target(rewards: Tensor, alive: Tensor, next_value: Tensor, discount: float) -> Tensor:
-    """Target of Q, (S, B, 1): the reward and what the next state is worth, if there is one."""
+    """Target of Q, (S, B, 1): the reward, plus the discounted value of the next state if the bottle did not fall."""
     return rewards + discount * alive * next_value
 
 
 def value_target(action_value: Tensor, log_probability: Tensor) -> Tensor:
-    """Target of V, (S, B, 1): Q of the policy's own action, less its log probability."""
+    """Target of V, (S, B, 1): Q of the policy's action minus its log density."""
     return action_value - log_probability
 
 
-def squared_error(found: Tensor, target: Tensor) -> Tensor:
+def squared_error(prediction: Tensor, target: Tensor) -> Tensor:
     """Mean squared error of each agent, (S,)."""
-    return (found - target).square().mean(dim=(1, 2))
+    return (prediction - target).square().mean(dim=(1, 2))
 
 
 def policy_loss(action_value: Tensor, log_probability: Tensor, mean: Tensor, log_std: Tensor) -> Tensor:
-    """Loss of the policy of each agent, (S,): soft value with its sign turned, and the penalty."""
+    """Loss of each agent's policy, (S,): the negative soft value plus the penalty."""
     penalty = mean.square() + log_std.square()
     return (log_probability - action_value + PENALTY * penalty).mean(dim=(1, 2))
 
 
 class Sac:
-    """Networks, optimiser and update of S agents."""
+    """Networks, optimiser and updates of S agents."""
 
     def __init__(self, rngs: Sequence[np.random.Generator], device: str = "cpu") -> None:
-        """Draws each agent's networks from its own generator."""
+        """Initialises each agent's networks from its own generator."""
         self.policy = Stack.make(policy.STATE, 2, rngs, device)
         self.action_value = Stack.make(policy.STATE + 1, 1, rngs, device)
         self.value = Stack.make(policy.STATE, 1, rngs, device)
         self.target = self.value.copy()
-        self.optimiser = torch.optim.Adam(self.learned, lr=LEARNING_RATE, fused=True)
+        self.optimiser = torch.optim.Adam(self.trained_parameters, lr=LEARNING_RATE, fused=True)
 
     @property
-    def learned(self) -> list[Tensor]:
-        """The parameters that gradients move, in a fixed order."""
+    def trained_parameters(self) -> list[Tensor]:
+        """The trained parameters, in a fixed order."""
         return [*self.policy.parameters, *self.action_value.parameters, *self.value.parameters]
 
     @torch.no_grad()
@@ -80,17 +80,17 @@ class Sac:
         return policy.sample(*policy.head(self.policy(states)), noise)[0]
 
     def losses(self, batch: Batch, noise: Tensor) -> Tensor:
-        """Losses (3, S) of Q, V and policy; the gradient of each reaches its own network alone."""
+        """Losses (3, S) of Q, V and policy; the gradient of each loss reaches only its own network."""
         mean, log_std = policy.head(self.policy(batch.states))
         actions, log_probability = policy.sample(mean, log_std, noise)
-        own = self.action_value.frozen()(torch.cat([batch.states, actions], dim=-1))
+        sampled = self.action_value.frozen()(torch.cat([batch.states, actions], dim=-1))
         with torch.no_grad():
-            critic = action_value_target(batch.rewards, batch.alive, self.target(batch.nexts), DISCOUNT)
+            target = action_value_target(batch.rewards, batch.alive, self.target(batch.nexts), DISCOUNT)
         taken = self.action_value(torch.cat([batch.states, batch.actions], dim=-1))
         return torch.stack([
-            squared_error(taken, critic),
-            squared_error(self.value(batch.states), value_target(own, log_probability).detach()),
-            policy_loss(own, log_probability, mean, log_std),
+            squared_error(taken, target),
+            squared_error(self.value(batch.states), value_target(sampled, log_probability).detach()),
+            policy_loss(sampled, log_probability, mean, log_std),
         ])  # fmt: skip
 
     def update(self, batch: Batch, noise: Tensor) -> Tensor:
@@ -99,13 +99,13 @@ class Sac:
         self.optimiser.zero_grad(set_to_none=True)
         losses.sum().backward()
         self.optimiser.step()
-        self.target.follow(self.value, POLYAK)
+        self.target.average_with(self.value, POLYAK)
         return losses.detach()
 
     def save(self) -> dict[str, np.ndarray]:
-        """Copies of all parameters and of the optimiser's memory, by name."""
-        return snapshot.save([*self.learned, *self.target.parameters], self.optimiser)
+        """Copies of all parameters and of the optimiser's state, by name."""
+        return snapshot.save([*self.trained_parameters, *self.target.parameters], self.optimiser)
 
     def load(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Takes over what `save` gave."""
-        snapshot.load([*self.learned, *self.target.parameters], self.optimiser, saved)
+        """Restores the arrays that `save` returned."""
+        snapshot.load([*self.trained_parameters, *self.target.parameters], self.optimiser, saved)

@@ -1,4 +1,4 @@
-"""How long the baselines train."""
+"""How long the baselines train: presets and their schedules."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ Preset = Literal["paper", "quick", "smoke"]
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """How long a training is: epochs, frames before the first update, epochs between checkpoints.
+    """The length of a training: epochs, frames before the first update, epochs between checkpoints.
 
-    `episodes` limits the expert episodes that are played to learn from; None plays all of `train`.
+    `episodes` is the largest number of expert episodes to learn from; None takes all cases of `train`.
     """
 
     epochs: int
@@ -21,7 +21,7 @@ class Schedule:
     episodes: int | None = None
 
 
-# All of `quick` but its end is that of `paper`: one is the first epochs of the other, bit for bit.
+# `quick` differs from `paper` only in its end: its epochs are the first epochs of `paper`, bit for bit.
 SCHEDULES: dict[str, Schedule] = {
     "paper": Schedule(epochs=1000, warm_start=10_000, period=10),
     "quick": Schedule(epochs=200, warm_start=10_000, period=10),
@@ -31,7 +31,7 @@ SCHEDULES: dict[str, Schedule] = {
 
 @dataclass(frozen=True)
 class Scheduled:
-    """What the baselines that learn have in common: a preset, which names the run and sets its schedule."""
+    """The common settings of the baselines that learn: a preset, which names the run and sets its schedule."""
 
     name: ClassVar[str]
     train_source: ClassVar[str] = ""
@@ -41,17 +41,17 @@ class Scheduled:
 
     @property
     def label(self) -> str:
-        """The method's name with its settings, and its preset where that is not the paper's."""
+        """The method's name with its settings, and its preset if it is not "paper"."""
         return self.stem + ("" if self.preset == "paper" else f"-{self.preset}")
 
     @property
     def stem(self) -> str:
-        """The label less the preset."""
+        """The label without the preset."""
         return self.name
 
     @property
     def epochs(self) -> int:
-        """How many there are."""
+        """Number of epochs of the training."""
         return SCHEDULES[self.preset].epochs
 
     @property
@@ -61,15 +61,15 @@ class Scheduled:
 
     @property
     def demonstrated(self) -> int:
-        """Expert transitions in each batch."""
+        """Number of expert transitions in each batch."""
         return 0
 
     def demonstrations(self, episodes: int) -> int:
-        """Expert episodes that it learns from, of so many in `train`."""
-        least = SCHEDULES[self.preset].episodes or episodes
-        return min(least, episodes) if self.demonstrated else 0
+        """Number of expert episodes that the method learns from, if `train` has `episodes` cases."""
+        limit = SCHEDULES[self.preset].episodes or episodes
+        return min(limit, episodes) if self.demonstrated else 0
 
     @property
     def timing_run(self) -> Self:
-        """The shortest preset: all updates of its last epoch are made, as in those of the others."""
+        """The shortest preset: its last epoch makes all updates, like the epochs of the other presets."""
         return replace(self, preset="smoke")

@@ -1,4 +1,4 @@
-"""SIM: RLIL where the paper's earlier study trained, in the simulated-trajectory world."""
+"""SIM: RLIL in the environment of the paper's earlier study, with simulated trajectories."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from baselines.rlil import Rlil
 
 @dataclass(frozen=True)
 class Sim(Rlil):
-    """RLIL trained and evaluated on minimum-jerk reaches: no entrant of the tracks (paper, fig. 4a, "SIM")."""
+    """RLIL trained and evaluated on minimum-jerk reaches, not on a track's reaches (paper, fig. 4a, "SIM")."""
 
     name: ClassVar[str] = "sim"
     train_source: ClassVar[str] = "minjerk"

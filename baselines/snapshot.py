@@ -1,4 +1,4 @@
-"""Parameters and an Adam optimiser's memory of them as named arrays, and back, bit for bit."""
+"""Saves parameters and the state of their Adam optimiser as named arrays, and restores them bit for bit."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ import numpy as np
 import torch
 from torch import Tensor
 
-MEMORY = ("step", "exp_avg", "exp_avg_sq")
+OPTIMISER_STATE = ("step", "exp_avg", "exp_avg_sq")
 
 
 def save(parameters: Sequence[Tensor], optimiser: torch.optim.Optimizer) -> dict[str, np.ndarray]:
-    """Copies of the parameters, as `layer.0`, ..., and of what the optimiser keeps of those it moves."""
-    found = {f"layer.{i}": parameter for i, parameter in enumerate(parameters)}
+    """Copies of the parameters (`layer.0`, ...) and of the optimiser's state (`adam.0.step`, ...)."""
+    tensors = {f"layer.{i}": parameter for i, parameter in enumerate(parameters)}
     for i, parameter in enumerate(parameters):
-        found |= {f"adam.{i}.{name}": tensor for name, tensor in optimiser.state.get(parameter, {}).items()}
-    return {name: tensor.detach().cpu().numpy().copy() for name, tensor in found.items()}
+        tensors |= {f"adam.{i}.{name}": tensor for name, tensor in optimiser.state.get(parameter, {}).items()}
+    return {name: tensor.detach().cpu().numpy().copy() for name, tensor in tensors.items()}
 
 
 @torch.no_grad()
 def load(parameters: Sequence[Tensor], optimiser: torch.optim.Optimizer, saved: Mapping[str, np.ndarray]) -> None:
-    """Puts parameters and optimiser where those were that `save` was told of."""
+    """Restores parameters and optimiser from the arrays that `save` returned."""
     for i, parameter in enumerate(parameters):
         parameter.copy_(torch.tensor(saved[f"layer.{i}"]))
         if f"adam.{i}.step" in saved:
-            memory = {name: torch.tensor(saved[f"adam.{i}.{name}"], device=parameter.device) for name in MEMORY}
-            optimiser.state[parameter] = memory
+            optimiser.state[parameter] = {
+                name: torch.tensor(saved[f"adam.{i}.{name}"], device=parameter.device) for name in OPTIMISER_STATE
+            }

@@ -1,4 +1,4 @@
-"""SOR: SIM's policy on the reaches of the track; it trains nothing."""
+"""SOR: plays SIM's policy on the reaches of the track; it trains nothing."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from baselines.sim import Sim
 
 @dataclass(frozen=True)
 class Sor(Scheduled):
-    """SIM's policy taken to other reaches (paper, fig. 4a, "SOR")."""
+    """SIM's policy on other reaches (paper, fig. 4a, "SOR")."""
 
     name: ClassVar[str] = "sor"
 
     @property
     def source_policy(self) -> Sim:
-        """Whose policy it is."""
+        """SIM with the same preset."""
         return Sim(preset=self.preset)

@@ -1,4 +1,4 @@
-"""An episode as a row of the table of episodes."""
+"""The row of an episode in the table of episodes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dextron_bench.splits.loading import Split
 
 
 def row(split: Split, index: int, episode: Episode) -> dict[str, Any]:
-    """An episode's row of the table of episodes; with its actions it can be played again, bit for bit."""
-    found = diagnosis.diagnose(episode, split.cases[index])
+    """An episode's row in the table of episodes; setting and actions are enough to replay it bit for bit."""
+    diagnosed = diagnosis.diagnose(episode, split.cases[index])
     return {
         "split": split.name,
         "digest": split.digest,
@@ -24,8 +24,8 @@ def row(split: Split, index: int, episode: Episode) -> dict[str, Any]:
         "terminated": episode.terminated,
         "truncated": episode.truncated,
         "failure": episode.failure,
-        "cause": found.cause,
-        "closing_lag": found.closing_lag,
+        "cause": diagnosed.cause,
+        "closing_lag": diagnosed.closing_lag,
         "actions": episode.actions[:, 0],
         "trace": fingerprint(episode),
         "final": episode.states[-1],

@@ -1,6 +1,6 @@
-"""Episodes: the arrays of one rollout, and short hashes that identify them.
+"""Episodes: the arrays of one rollout, and hashes that identify them.
 
-Equal settings and actions give equal bits, so one hash is enough to compare two episodes.
+Equal settings and equal actions give equal bits, so comparing one hash is enough to compare two episodes.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from dextron_bench.reaches.setting import Setting
 from dextron_bench.storage import hashing
 from dextron_bench.world import task
 
-SHORT = 12  # Hexadecimal digits of a hash of actions in a result.
+SHORT = 12  # Hexadecimal digits of each hash of actions in a result.
 
 
 @dataclass(frozen=True, slots=True)
 class Episode:
     """One rollout: states (T + 1, 48), actions (T, 1), rewards (T,), float64, and how it ended.
 
-    `failure` says what the agent did wrong where that ended the episode; such an episode scores 0.
+    `failure` is empty, or says what the agent did wrong; an episode with a failure ends there and scores 0.
     """
 
     setting: Setting
@@ -39,7 +39,7 @@ class Episode:
 
     @property
     def success(self) -> bool:
-        """True where the bottle was held up for the whole countdown."""
+        """True if the bottle was held up for the whole countdown."""
         return self.score == task.SUCCESS
 
 
@@ -50,5 +50,5 @@ def fingerprint(episode: Episode) -> str:
 
 
 def action_hashes(actions: Iterable[np.ndarray]) -> list[str]:
-    """The first digits of the hash of each episode's actions (T,), to find copied episodes."""
+    """The first SHORT digits of the hash of each episode's actions (T,); copied episodes have equal hashes."""
     return [hashing.digest(np.ascontiguousarray(array, "<f8").tobytes())[:SHORT] for array in actions]

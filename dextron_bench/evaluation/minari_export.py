@@ -1,4 +1,4 @@
-"""Episodes as a Minari data set, which offline learners load; the only importer of minari."""
+"""Writes episodes as a Minari data set for offline learning; the only module that imports minari."""
 
 from __future__ import annotations
 
@@ -27,28 +27,28 @@ if TYPE_CHECKING:
     from minari.dataset.minari_storage import MinariStorage
 
 ENVIRONMENT = "dextron_bench/Grasp-v0"
-FORMAT = "arrow"  # Of Minari's formats the one that needs no further package.
-DATA = "data"  # Minari's name for a data set's folder below that of its name.
+FORMAT = "arrow"  # The format of Minari that needs no further package.
+DATA = "data"  # Minari's name for the folder of the data, inside the data set's folder.
 NAME = re.compile(r"[\w-]+(/[\w-]+)*-v\d+", re.ASCII)
 CONTRIBUTORS = "the dextron-bench contributors"
 
-Report = Callable[[int, int], None]  # Told (episodes, episodes wanted).
+Report = Callable[[int, int], None]  # Receives (finished episodes, all episodes).
 
 
 class MissingMinari(ImportError):
-    """Minari is an extra."""
+    """Minari is not installed; it is an optional dependency."""
 
     def __init__(self) -> None:
-        super().__init__("Minari is not installed; `pip install 'minari[arrow]'` brings it")
+        super().__init__("Minari is not installed; `pip install 'minari[arrow]'` installs it")
 
 
 class BadExport(ValueError):
-    """A data set that cannot be."""
+    """A data set that cannot be written."""
 
 
 @dataclass(frozen=True, slots=True)
 class Player:
-    """Who acts, by a name, and what is known of it: plain values."""
+    """An agent that plays, its name, and plain values that describe it in the data set's metadata."""
 
     name: str
     agent: Agent
@@ -57,9 +57,9 @@ class Player:
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """What a data set holds: every player's episodes on the first `rows` cases of a split, player after player.
+    """A data set to write: the episodes of each player in turn on the first `rows` cases of a split.
 
-    `name` is Minari's id of it, as "dextron/real-train-experts-v0".
+    `name` is Minari's id of the data set, such as "dextron/real-train-experts-v0".
     """
 
     name: str
@@ -74,39 +74,39 @@ class Export:
                 f"{self.name!r} names no data set; a name ends in a version, as dextron/my-episodes-v0 does"
             )
         if self.rows < 1 or not self.players:
-            raise BadExport("a data set needs at least one row, and somebody who plays it")
+            raise BadExport("a data set needs at least one row and one player")
 
-    def write(self, source: Source, into: Path, threads: int = 0, report: Report = lambda done, wanted: None) -> Path:
-        """Plays the episodes and stores them below the folder `into`; returns the data set's own folder.
+    def write(self, source: Source, into: Path, threads: int = 0, report: Report = lambda done, total: None) -> Path:
+        """Plays the episodes and stores them below the folder `into`; returns the data set's folder.
 
-        Nothing else is written, and after an error nothing of it is left. Raises MissingMinari, BadExport where the
-        data set is there already or a player fails, and what `rollout` does.
+        Writes nothing else, and leaves nothing after an error. Raises MissingMinari, BadExport if the data set already
+        exists or a player fails, AgentError.
         """
         folder = into / self.name
-        with _whole(folder) as part:
-            storage = _new(part / DATA, self.split.reaches)
-            told = dict(self._play(storage, source, threads, report))
-            storage.update_episode_metadata([told[number] for number in sorted(told)])
-            storage.update_metadata(self._about())
+        with _atomic_folder(folder) as part:
+            storage = _create_storage(part / DATA, self.split.reaches)
+            metadata = dict(self._play(storage, source, threads, report))
+            storage.update_episode_metadata([metadata[number] for number in sorted(metadata)])
+            storage.update_metadata(self._metadata())
         return folder
 
     def _play(
         self, storage: MinariStorage, source: Source, threads: int, report: Report
     ) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Stores every episode, and yields its number and what is told of it."""
+        """Plays and stores every episode; yields its number and its metadata."""
         cases = self.split.cases[: self.rows]
-        with _unweighed(storage):
+        with _without_size(storage):
             for place, player in enumerate(self.players):
                 for done, (row, episode) in enumerate(rollout(player.agent, source, cases, threads=threads), 1):
                     if episode.failure:
                         raise BadExport(f"{player.name} failed in row {row} of {self.split.name!r}: {episode.failure}")
                     number = place * len(cases) + row
                     storage.update_episodes([_buffer(number, episode)])
-                    yield number, {"player": player.name, "row": row} | _told(episode)
+                    yield number, {"player": player.name, "row": row} | _episode_metadata(episode)
                     report(place * len(cases) + done, len(self.players) * len(cases))
 
-    def _about(self) -> dict[str, Any]:
-        """The data set's metadata: Minari's own keys, and beside them all that the episodes depend on."""
+    def _metadata(self) -> dict[str, Any]:
+        """The data set's metadata: Minari's own keys, and everything that the episodes depend on."""
         import minari
 
         split, names = self.split, ", ".join(player.name for player in self.players)
@@ -128,11 +128,11 @@ class Export:
 
 
 @contextmanager
-def _whole(folder: Path) -> Iterator[Path]:
-    """A folder to fill that takes its place when all went well, and else is gone; raises BadExport."""
+def _atomic_folder(folder: Path) -> Iterator[Path]:
+    """A temporary folder that becomes `folder` after the block, or is removed after an error; raises BadExport."""
     if folder.exists():
-        raise BadExport(f"{folder} is there already; remove it, or choose another --name or --into")
-    part = folder.absolute().with_name(f".{folder.name}.{os.getpid()}.part")  # Minari loses its way on relative paths.
+        raise BadExport(f"{folder} already exists; remove it, or choose another --name or --into")
+    part = folder.absolute().with_name(f".{folder.name}.{os.getpid()}.part")  # Minari fails on relative paths.
     part.mkdir(parents=True)
     try:
         yield part
@@ -142,15 +142,15 @@ def _whole(folder: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _unweighed(storage: MinariStorage) -> Iterator[None]:
-    """Keeps Minari from adding up all files after each episode, which takes hours of thousands of episodes."""
+def _without_size(storage: MinariStorage) -> Iterator[None]:
+    """Stops Minari from adding up the sizes of all files after each episode: thousands of episodes take hours."""
     storage.get_size = lambda: 0.0
     yield
     del storage.get_size
 
 
-def _new(folder: Path, reaches: str) -> MinariStorage:
-    """An empty data set; raises MissingMinari."""
+def _create_storage(folder: Path, reaches: str) -> MinariStorage:
+    """A new data set without episodes; raises MissingMinari."""
     try:
         from minari.dataset.minari_storage import MinariStorage
     except ModuleNotFoundError as error:
@@ -161,14 +161,14 @@ def _new(folder: Path, reaches: str) -> MinariStorage:
 
 
 def environment(reaches: str) -> EnvSpec:
-    """How Gymnasium makes the environment in which the episodes were played."""
+    """The spec from which Gymnasium makes the environment of the episodes."""
     import gymnasium
 
     return replace(gymnasium.spec(ENVIRONMENT), kwargs={"reaches": reaches})
 
 
 def _buffer(number: int, episode: Episode) -> EpisodeBuffer:
-    """An episode as Minari takes it."""
+    """An episode in the form that Minari stores."""
     from minari.data_collector import EpisodeBuffer
 
     ends = np.arange(len(episode.actions)) == len(episode.actions) - 1
@@ -182,16 +182,16 @@ def _buffer(number: int, episode: Episode) -> EpisodeBuffer:
     return EpisodeBuffer(id=number, **arrays)
 
 
-def _told(episode: Episode) -> dict[str, Any]:
-    """An episode's own metadata, by which it can be played again."""
+def _episode_metadata(episode: Episode) -> dict[str, Any]:
+    """The metadata of an episode; the setting is enough to play it again."""
     return {"setting": asdict(episode.setting), "return": episode.score, "is_success": episode.success}
 
 
 def summary(folder: Path) -> dict[str, Any]:
-    """How much a data set holds."""
+    """Numbers of episodes, steps and solved episodes of a data set, and its size [MB]."""
     from minari import MinariDataset
 
-    found = MinariDataset(folder / DATA)
-    told, megabytes = found.storage.get_episode_metadata(range(len(found))), found.storage.metadata["dataset_size"]
-    solved = sum(each["is_success"] for each in told)
-    return {"episodes": len(found), "steps": found.total_steps, "solved": solved, "megabytes": megabytes}
+    data = MinariDataset(folder / DATA)
+    solved = sum(metadata["is_success"] for metadata in data.storage.get_episode_metadata(range(len(data))))
+    megabytes = data.storage.metadata["dataset_size"]
+    return {"episodes": len(data), "steps": data.total_steps, "solved": solved, "megabytes": megabytes}

@@ -1,4 +1,4 @@
-"""What a model predicts of an episode, and what its expert would do, beside what happened."""
+"""Predictions of the success model and actions of the expert for each step of an episode."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from dextron_bench.world import task
 
 @dataclass(frozen=True, slots=True)
 class StepPredictions:
-    """What a recording shows of an episode of T steps besides its own arrays.
+    """What a recording shows of an episode of T steps besides the episode's own arrays.
 
-    `curves` (T, A) are the chances of success of the actions `grid` (A,) from -1 to 1. `chances` (T,) are the chances
-    of the actions that the agent took. `experts` (T,) are the actions that the setting's expert would have taken in
-    the same states. `duration` is the length of the reach [steps].
+    `curves` (T, A) are the predicted probabilities of success of the actions `grid` (A,) from -1 to 1. `chances` (T,)
+    are the probabilities for the actions that the agent took. `experts` (T,) are the actions of the setting's expert in
+    the same states. `duration` is the length of the reach [control steps].
     """
 
     grid: np.ndarray
@@ -28,7 +28,7 @@ class StepPredictions:
 
 
 def expert_actions(expert: Expert, states: np.ndarray) -> np.ndarray:
-    """What an expert would have done (T,) in states (T, 48) that came one after the other."""
+    """The actions (T,) of an expert in consecutive states (T, 48) of an episode, from its first state on."""
     distances = task.distance(states)
     closing = policies.is_closing(distances, np.full(len(states), distances[0]), np.full(len(states), expert.critical))
     actions = policies.closing_speeds(task.closure(states), closing, np.full(len(states), expert.gain))[:, 0]

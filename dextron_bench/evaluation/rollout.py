@@ -1,4 +1,4 @@
-"""Any agent on any list of settings, N at once, to episodes; the only evaluation loop."""
+"""Plays any agent on any list of cases, N episodes at once; the only evaluation loop."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from dextron_bench.reaches.setting import Source
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine, Step
 
-SLOTS = 256  # Episodes at once. Fixed, because an entrant's last bits may depend on the batch (see `exact`).
+SLOTS = 256  # Episodes at once. Fixed, because the last bits of an agent's actions may depend on the batch size.
 
 
 def rollout(
     agent: Agent, source: Source, cases: Sequence[Case], slots: int = SLOTS, threads: int = 0
 ) -> Iterator[tuple[int, Episode]]:
-    """Plays every case once; yields (index of the case, episode) as episodes end.
+    """Plays every case once; yields (index of the case, episode) in the order in which episodes end.
 
-    Raises AgentError where the agent raises or actions have a wrong shape. An action that is not finite or lies outside
-    [-1, 1] fails its own episode and no other; AgentCrashed fails those that are being played.
+    Raises AgentError if the agent raises an exception or returns actions of a wrong shape. An action that is not finite
+    or lies outside [-1, 1] fails its own episode only; AgentCrashed fails all current episodes.
     """
     return _Evaluation(agent, source, cases, Engine(min(slots, max(len(cases), 1)), threads)).run()
 
 
 class _Evaluation:
-    """Slots with a case each, refilled as episodes end."""
+    """Plays one case per slot; a slot gets the next case when its episode ends."""
 
     def __init__(self, agent: Agent, source: Source, cases: Sequence[Case], engine: Engine) -> None:
         n = engine.slots
@@ -42,7 +42,7 @@ class _Evaluation:
         self._now = np.zeros((n, model.STATE))
 
     def run(self) -> Iterator[tuple[int, Episode]]:
-        """Yields every case's episode."""
+        """Yields (index of the case, episode) of every case."""
         self._refill(np.arange(self._engine.slots))
         while (live := np.flatnonzero(self._case >= 0)).size:
             try:
@@ -51,14 +51,14 @@ class _Evaluation:
                 yield from [self._episode(slot, failure=str(error)) for slot in live.tolist()]
                 self._refill(live)
                 continue
-            allowed = np.abs(actions[live, 0]) <= 1.0  # False for NaN.
-            sound, faulty = live[allowed], live[~allowed]
-            step = self._engine.step(sound, actions[sound])
-            self._note(sound, actions[sound], step)
+            is_valid = np.abs(actions[live, 0]) <= 1.0  # False for NaN.
+            valid, invalid = live[is_valid], live[~is_valid]
+            step = self._engine.step(valid, actions[valid])
+            self._store(valid, actions[valid], step)
             ended = np.flatnonzero(step.ended)
-            yield from [self._episode(sound[i], bool(step.terminated[i]), bool(step.truncated[i])) for i in ended]
-            yield from [self._episode(slot, failure=describe_fault(actions[slot, 0])) for slot in faulty]
-            self._refill(np.union1d(sound[ended], faulty))
+            yield from [self._episode(valid[i], bool(step.terminated[i]), bool(step.truncated[i])) for i in ended]
+            yield from [self._episode(slot, failure=describe_fault(actions[slot, 0])) for slot in invalid]
+            self._refill(np.union1d(valid[ended], invalid))
 
     def _ask(self) -> np.ndarray:
         with as_agent_error("the agent's act()"):
@@ -71,7 +71,7 @@ class _Evaluation:
         return actions.astype(np.float64)
 
     def _refill(self, slots: np.ndarray) -> None:
-        """Gives the next cases to free slots; slots that get none fall idle."""
+        """Starts the next cases in free slots; slots without a case stay idle."""
         self._case[slots] = -1
         slots = slots[: len(self._cases) - self._next]
         if not slots.size:
@@ -87,7 +87,7 @@ class _Evaluation:
         with as_agent_error("the agent's reset()"):
             self._agent.reset(slots)
 
-    def _note(self, slots: np.ndarray, actions: np.ndarray, step: Step) -> None:
+    def _store(self, slots: np.ndarray, actions: np.ndarray, step: Step) -> None:
         at = self._length[slots]
         self._actions[slots, at], self._rewards[slots, at] = actions, step.rewards
         self._states[slots, at + 1] = self._now[slots] = step.states
@@ -96,7 +96,7 @@ class _Evaluation:
     def _episode(
         self, slot: int, terminated: bool = False, truncated: bool = False, failure: str = ""
     ) -> tuple[int, Episode]:
-        """The number of the slot's case, and its episode."""
+        """The index of a slot's case, and its episode so far."""
         n = self._length[slot]
         return int(self._case[slot]), Episode(
             self._cases[self._case[slot]].setting,
@@ -110,5 +110,5 @@ class _Evaluation:
 
 
 def describe_fault(action: float) -> str:
-    """What is wrong with an action that may not be played."""
+    """Why an action is invalid."""
     return f"action {action:g} is outside [-1, 1]" if np.isfinite(action) else f"action is {action}"

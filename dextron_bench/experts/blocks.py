@@ -1,4 +1,4 @@
-"""The folder of a search: its blocks in store, one file each, and what they add up to."""
+"""The folder of a search: one file per block of draws, and the counts over all blocks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pandas as pd
 from dextron_bench.storage import atomic, folder_config
 from dextron_bench.world import model, task
 
-SEARCH = "search.json"  # Which search the folder belongs to.
+SEARCH = "search.json"  # The search that the folder belongs to.
 KEPT = 1.0  # Rows with a sum of rewards above this are kept (paper, II.C).
 
 
@@ -21,7 +21,7 @@ class DamagedBlock(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """How far a search is: blocks in store, draws tried, rows kept, rows with all 20 rewards."""
+    """The progress of a search: finished blocks, draws tried, rows kept, rows with all 20 rewards."""
 
     blocks: int
     draws: int
@@ -30,29 +30,29 @@ class Tally:
 
 
 def write_or_check(search: dict[str, Any], folder: Path) -> None:
-    """Makes the folder this search's, or checks that it is."""
+    """Writes the search into a new folder; raises FolderMismatch if the folder holds another search."""
     config = {"search": search, "physics": model.mjcf_hash()}
     folder_config.write_or_check_file(folder / SEARCH, config, "search", "choose another folder, or remove it")
 
 
 def read_config(folder: Path) -> dict[str, Any]:
-    """Which search, under which physics, a folder was claimed for; empty where it was for none."""
+    """The search that a folder holds, and the hash of its physics; empty if it holds none."""
     file = folder / SEARCH
     return atomic.read_json(file) if file.exists() else {}
 
 
 def write(folder: Path, number: int, draws: pd.DataFrame) -> None:
-    """Puts a block in store, whole."""
+    """Writes the file of a block atomically."""
     atomic.write_atomically(block_file(folder, number), lambda part: draws.to_parquet(part, compression="zstd"))
 
 
 def block_file(folder: Path, number: int) -> Path:
-    """Where a block is stored."""
+    """The file of a block."""
     return folder / "blocks" / f"{number:06d}.parquet"
 
 
 def update_tallies(folder: Path, done: dict[int, Tally]) -> dict[int, Tally]:
-    """The tallies of all blocks in store; only those not yet in `done` are read."""
+    """The tallies of all blocks in the folder; reads only the blocks that are not in `done`."""
     stored = sorted(int(file.stem) for file in (folder / "blocks").glob("[0-9]*.parquet"))
     return {number: done.get(number) or _tally(read(block_file(folder, number))) for number in stored}
 
@@ -66,13 +66,13 @@ def read(file: Path) -> pd.DataFrame:
 
 
 def total(done: dict[int, Tally]) -> Tally:
-    """The sum over blocks."""
+    """The sum of the tallies of blocks."""
     parts = done.values()
     return Tally(len(done), sum(t.draws for t in parts), sum(t.kept for t in parts), sum(t.solved for t in parts))
 
 
 def last_block_needed(done: dict[int, Tally], rows: int) -> int | None:
-    """The block with which blocks 0, 1, ... reach so many solved rows; None while they do not."""
+    """The first block up to which blocks 0, 1, ... hold `rows` solved rows together; None if they hold fewer."""
     solved = number = 0
     while number in done:
         solved += done[number].solved

@@ -1,4 +1,4 @@
-"""Expert databases G_s: the draws of a search that grasped, with the statistics of all that were tried."""
+"""Expert databases G_s: the draws of a search that grasped the bottle, and statistics of all draws."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BANDS = 9  # Equal bands of d_c in the statistics.
 
 
 class DamagedDatabase(ValueError):
-    """A database that is not what its summary says."""
+    """A database that cannot be read, or whose rows differ from its summary."""
 
 
 def save(
@@ -46,33 +46,33 @@ def save(
 
 
 def load(file: Path) -> pd.DataFrame:
-    """The rows of a database, checked against its summary; raises DamagedDatabase, FileNotFoundError."""
+    """The rows of a database, verified against its summary; raises DamagedDatabase, FileNotFoundError."""
     expected = summary(file)["digest"]
     try:
         rows = pd.read_parquet(file)
-        found = rows_digest(rows)
+        actual = rows_digest(rows)
     except FileNotFoundError:
         raise
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DamagedDatabase(f"expert database {file} is damaged ({error}); make it again with `mc`") from error
-    if found != expected:
-        raise DamagedDatabase(f"expert database {file} does not fit its summary; make it again with `mc`")
+    if actual != expected:
+        raise DamagedDatabase(f"expert database {file} does not match its summary; make it again with `mc`")
     return rows
 
 
 def summary(file: Path) -> dict[str, Any]:
-    """What is known of a database: search, counts, statistics, provenance; raises as `load`."""
+    """A database's search, counts, statistics and provenance; raises DamagedDatabase, FileNotFoundError."""
     try:
-        found = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
+        about = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
     except ValueError as error:
         raise DamagedDatabase(f"summary of expert database {file} is damaged ({error}); make it again") from error
-    if not isinstance(found, dict) or not {"digest", "search", "statistics"} <= set(found):
-        raise DamagedDatabase(f"summary of expert database {file} is not whole; make it again with `mc`")
-    return found
+    if not isinstance(about, dict) or not {"digest", "search", "statistics"} <= set(about):
+        raise DamagedDatabase(f"summary of expert database {file} is incomplete; make it again with `mc`")
+    return about
 
 
 def load_shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:
-    """The database that ships for a source of reaches, and its summary; raises FileNotFoundError where none does."""
+    """The shipped database of a source of reaches, and its summary; raises FileNotFoundError if none ships."""
     with as_file(files("dextron_bench") / "data") as folder:
         file = folder / f"experts-{reaches}.parquet"
         if not file.exists():
@@ -88,18 +88,18 @@ def rows_digest(rows: pd.DataFrame) -> str:
 
 
 def statistics(draws: pd.DataFrame, source: setting.Source) -> pd.DataFrame:
-    """Success by subject, ring, angle, start region, d_c [fraction of the first distance] and duration [s].
+    """Counts and success rates by subject, ring, angle, start region, d_c [of the first distance] and duration [s].
 
     Columns: by, value, draws, kept, solved, then `kept_rate` and `solved_rate` in [0, 1].
     """
     strata = {name: source.stratum(name) for name in draws["reach"].unique()}
-    of = draws["reach"].map
+    for_reach = draws["reach"].map
     keys = {
         "all": pd.Series("all", index=draws.index),
-        "subject": of(lambda name: strata[name].subject),
-        "ring": of(lambda name: str(strata[name].ring)),
-        "angle": of(lambda name: str(strata[name].angle)),
-        "region": of(lambda name: f"{strata[name].ring}{strata[name].angle}"),
+        "subject": for_reach(lambda name: strata[name].subject),
+        "ring": for_reach(lambda name: str(strata[name].ring)),
+        "angle": for_reach(lambda name: str(strata[name].angle)),
+        "region": for_reach(lambda name: f"{strata[name].ring}{strata[name].angle}"),
         "d_c": _bands(draws["critical"], np.linspace(0.0, 0.9, BANDS + 1)),
         "duration": _bands(pd.Series([source.duration(s) for s in setting.from_frame(draws)]), np.arange(11.0)),
     }
@@ -117,7 +117,7 @@ def statistics(draws: pd.DataFrame, source: setting.Source) -> pd.DataFrame:
 
 
 def _bands(values: pd.Series, edges: np.ndarray) -> pd.Series:
-    """The band that each value lies in, as text."""
+    """The band of each value as text, such as "0.1 to 0.2"."""
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
     names = np.array([f"{low:.1f} to {high:.1f}" for low, high in itertools.pairwise(edges)])
     return pd.Series(names[place], index=values.index)

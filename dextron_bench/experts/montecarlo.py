@@ -1,7 +1,7 @@
-"""The search for G_s: settings and experts drawn at random, and which of them grasp (paper, II.C).
+"""The search for G_s: draws settings and experts at random, and plays them (paper, II.C).
 
-The search runs in blocks of settings. A block's draws depend on its number alone, so the search can be
-killed and taken up again, on any number of threads, and finds the same rows.
+The search runs in blocks of settings. The draws of a block depend only on its number. So a search that was killed can
+continue, on any number of threads, and finds the same rows.
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ from dextron_bench.reaches import setting
 from dextron_bench.storage import folder_config
 from dextron_bench.world.engine import Engine
 
-SLOTS = 1024  # Episodes at once, among them those kept free for experts still to close.
+SLOTS = 1024  # Episodes at once, with the slots that are reserved for forks.
 
 
 class BadSearch(ValueError):
-    """A search that cannot be."""
+    """Settings of a search that are not possible."""
 
 
 @dataclass(frozen=True)
 class Search:
-    """Which search: equal searches find equal rows.
+    """The settings of a search; equal searches find equal rows.
 
-    `experts` are tried per setting, of one gain, one in each of as many equal bands of d_c, so that every
-    draw by itself is uniform as in the paper; `block` settings are drawn and stored together.
+    Each setting is tried with `experts` experts of one gain. The range of d_c is cut into as many equal bands, and each
+    expert's d_c is drawn from one band, so that every single draw is uniform as in the paper. `block` settings are
+    drawn and stored together.
     """
 
     reaches: str = "real"
@@ -45,7 +46,7 @@ class Search:
 
 
 def draw(source: setting.Source, search: Search, block: int) -> pd.DataFrame:
-    """The draws of one block: fields of `Setting`, `gain`, `critical`; `experts` rows a setting."""
+    """The draws of one block, `experts` rows per setting; columns: the fields of `Setting`, `gain`, `critical`."""
     rng = np.random.default_rng([search.seed, block])
     settings = setting.to_frame([source.sample(rng) for _ in range(search.block)])
     low, high = policies.CRITICAL_DISTANCE
@@ -56,17 +57,17 @@ def draw(source: setting.Source, search: Search, block: int) -> pd.DataFrame:
     return draws
 
 
-def batches(source: setting.Source, draws: pd.DataFrame, experts_each: int) -> Iterator[branching.ExpertBatch]:
-    """One batch for each run of `experts_each` rows that share a setting."""
+def batches(source: setting.Source, draws: pd.DataFrame, experts_per_setting: int) -> Iterator[branching.ExpertBatch]:
+    """One batch per setting: each `experts_per_setting` consecutive rows share one."""
     gains, criticals = draws["gain"].to_numpy(), draws["critical"].to_numpy()
-    firsts = range(0, len(draws), experts_each)
-    for i, case in zip(firsts, setting.from_frame(draws.iloc[::experts_each]), strict=True):
-        yield branching.ExpertBatch(source.path(case), gains[i], criticals[i : i + experts_each])
+    firsts = range(0, len(draws), experts_per_setting)
+    for i, case in zip(firsts, setting.from_frame(draws.iloc[::experts_per_setting]), strict=True):
+        yield branching.ExpertBatch(source.path(case), gains[i], criticals[i : i + experts_per_setting])
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """The part of a search that one of several processes does: blocks `index`, `index` + `of`, ..."""
+    """The blocks that one of several processes searches: `index`, `index` + `of`, `index` + 2 `of`, ..."""
 
     index: int = 0
     of: int = 1
@@ -77,7 +78,7 @@ class Share:
 
     @classmethod
     def parse(cls, text: str) -> Share:
-        """A share from text like 0/2; raises BadSearch."""
+        """The share that a text like 0/2 names; raises BadSearch."""
         index, _, of = text.partition("/")
         if not (index.isdecimal() and of.isdecimal()):
             raise BadSearch(f"share {text!r} is not like 0/2, the first of two")
@@ -93,11 +94,10 @@ def run(
     report: Callable[[blocks.Tally], None] = lambda tally: None,
     share: Share | None = None,
 ) -> pd.DataFrame:
-    """Searches on until `rows` rows have all 20 rewards; returns every draw with its outcome, in order.
+    """Searches, or continues, until `rows` rows have all 20 rewards; returns every draw with its outcome, in order.
 
-    Columns: those of `draw`, then `score` (sum of rewards) and `length` [control steps]. Processes with
-    different shares may work in one folder. Raises FolderMismatch where it holds another search, and
-    DamagedBlock.
+    Columns: the columns of `draw`, then `score` (sum of rewards) and `length` [control steps]. Processes with different
+    shares may work in one folder. Raises FolderMismatch if the folder holds another search, DamagedBlock.
     """
     blocks.write_or_check(asdict(search), folder)
     done = blocks.update_tallies(folder, {})
@@ -115,57 +115,59 @@ def run(
 
 
 def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataFrame, count: int) -> None:
-    """Puts in store the first `count` blocks, of which a database holds the `kept` rows, to search on from there.
+    """Writes the first `count` blocks of a search again from the `kept` rows of its database, so that it can continue.
 
-    Only what a database knows comes back: draws it did not keep get a score of 0 and no length. Blocks
-    already in store stay. Raises FolderMismatch where rows are not of this search.
+    Draws that the database does not hold get a score of 0 and no length. Blocks that exist stay as they are. Raises
+    FolderMismatch if the rows do not belong to this search.
     """
     blocks.write_or_check(asdict(search), folder)
     key = ["reach", "gain", "critical"]
-    found = 0
+    restored = 0
     for number in range(count):
         draws = draw(source, search, number).assign(score=0.0, length=np.nan)
-        ahead = kept.iloc[found : found + len(draws)]
-        place = pd.MultiIndex.from_frame(draws[key]).get_indexer(pd.MultiIndex.from_frame(ahead[key]))
-        place = place[np.logical_and.accumulate(place >= 0)]
-        draws.loc[place, ["score", "length"]] = ahead[["score", "length"]].head(len(place)).to_numpy(float)
-        found += len(place)
+        next_kept = kept.iloc[restored : restored + len(draws)]
+        rows = pd.MultiIndex.from_frame(draws[key]).get_indexer(pd.MultiIndex.from_frame(next_kept[key]))
+        rows = rows[np.logical_and.accumulate(rows >= 0)]
+        draws.loc[rows, ["score", "length"]] = next_kept[["score", "length"]].head(len(rows)).to_numpy(float)
+        restored += len(rows)
         if not blocks.block_file(folder, number).exists():
             blocks.write(folder, number, draws)
-    if found < len(kept):
-        raise folder_config.FolderMismatch(f"row {found} of the database is not of a search with seed {search.seed}")
+    if restored < len(kept):
+        raise folder_config.FolderMismatch(
+            f"row {restored} of the database does not belong to a search with seed {search.seed}"
+        )
 
 
 def _play(
     source: setting.Source, search: Search, engine: Engine, done: Iterable[int], share: Share
 ) -> Iterator[tuple[int, pd.DataFrame]]:
-    """Yields the blocks that are not done, each when it is complete, without end; the engine never idles."""
+    """Yields each block that is not in `done` when it is complete, without end; the engine's slots stay busy."""
     skip = frozenset(done)
-    under_way: list[_Block] = []
+    started: list[_Block] = []
 
-    def asked() -> Iterator[branching.ExpertBatch]:
+    def all_batches() -> Iterator[branching.ExpertBatch]:
         for block in (number for number in itertools.count(share.index, share.of) if number not in skip):
             draws = draw(source, search, block)
-            under_way.append(_Block(block, draws, np.zeros(len(draws)), np.zeros(len(draws), int), search.block))
+            started.append(_Block(block, draws, np.zeros(len(draws)), np.zeros(len(draws), int), search.block))
             yield from batches(source, draws, search.experts)
 
-    for number, found in branching.play(engine, asked()):
-        current = under_way[number // search.block]
+    for number, outcomes in branching.play(engine, all_batches()):
+        current = started[number // search.block]
         first = number % search.block * search.experts
         rows = slice(first, first + search.experts)
-        current.scores[rows], current.lengths[rows] = found.returns, found.lengths
-        current.left -= 1
-        if not current.left:
+        current.scores[rows], current.lengths[rows] = outcomes.returns, outcomes.lengths
+        current.unfinished -= 1
+        if not current.unfinished:
             yield current.number, current.draws.assign(score=current.scores, length=current.lengths)
             del current.draws
 
 
 @dataclass(slots=True)
 class _Block:
-    """A block under way; `left` settings are still unanswered."""
+    """A block that is being played; `unfinished` settings have no outcomes yet."""
 
     number: int
     draws: pd.DataFrame
     scores: np.ndarray
     lengths: np.ndarray
-    left: int
+    unfinished: int

@@ -1,4 +1,4 @@
-"""The experts Pi_E of the paper: closing that starts at a critical distance (Eq. 1 and 2)."""
+"""The experts Pi_E of the paper: the hand closes when it is within a critical distance (Eq. 1 and 2)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from dextron_bench.world import task
 
-if TYPE_CHECKING:  # The process of an isolated agent imports experts, and may not import settings.
+if TYPE_CHECKING:  # The process of an isolated agent imports this module, and may not import settings.
     from dextron_bench.reaches.setting import Setting
 
 GAIN = (1.0, 1.5)  # K, drawn uniformly (table I).
@@ -29,7 +29,7 @@ class Expert:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What an agent is tried on: a setting, an expert for it, and the width of the range of d_c that succeeds."""
+    """One row of a split: a setting, an expert for it, and the width of the range of d_c that succeeds there."""
 
     setting: Setting
     expert: Expert
@@ -37,47 +37,47 @@ class Case:
 
 
 def is_closing(distances: np.ndarray, first: np.ndarray, critical: np.ndarray) -> np.ndarray:
-    """True where an expert is in its closing phase: distances [m], first distances [m], d_c, each (N,)."""
+    """True if an expert is in its closing phase, for distances [m], first distances [m] and d_c, each (N,)."""
     return (distances / first < critical) | (distances < ALWAYS_CLOSE)
 
 
 def closing_speeds(closures: np.ndarray, closing: np.ndarray, gain: np.ndarray) -> np.ndarray:
-    """Closing speeds (N, 1) in [-1, 1] of Eq. 1 for closures, phase and gain K, each (N,)."""
+    """Closing speeds (N, 1) in [-1, 1] by Eq. 1, for closures, closing phase (True or False) and gain K, each (N,)."""
     target = np.where(closing, CLOSED, OPEN)
     return np.clip(gain * (target - closures), -1.0, 1.0)[:, None]
 
 
 class ExpertAgent:
-    """Plays the expert that each episode is assigned.
+    """Plays each episode's expert, which `assign` sets.
 
-    The first action of an episode is 0; the distance at that step is what later ones are measured by.
+    The first action of an episode is 0. Later distances are divided by the distance at that first step.
     """
 
     def __init__(self) -> None:
         self._gain, self._critical, self._first = np.zeros((3, 0))
 
     def assign(self, episodes: np.ndarray, experts: Sequence[Expert]) -> None:
-        """Tells that `episodes` (n,) are about to play these experts."""
-        self._make_room(int(episodes.max()) + 1)
+        """Sets the experts that rows `episodes` (n,) play from their next `reset` on."""
+        self._grow(int(episodes.max()) + 1)
         self._gain[episodes] = [expert.gain for expert in experts]
         self._critical[episodes] = [expert.critical for expert in experts]
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Forgets what it saw in `episodes` (n,), which begin anew."""
+        """Forgets the first distance of rows `episodes` (n,), which begin a new episode."""
         self._first[episodes] = np.nan
 
     def act(self, states: np.ndarray) -> np.ndarray:
         """Closing speeds (N, 1) for states (N, 48)."""
-        self._make_room(len(states))
+        self._grow(len(states))
         distances = task.distance(states)
-        fresh = np.isnan(self._first)
-        self._first = np.where(fresh, distances, self._first)
+        first_step = np.isnan(self._first)
+        self._first = np.where(first_step, distances, self._first)
         closing = is_closing(distances, self._first, self._critical)
         actions = closing_speeds(task.closure(states), closing, self._gain)
-        actions[fresh] = 0.0
+        actions[first_step] = 0.0
         return actions
 
-    def _make_room(self, n: int) -> None:
+    def _grow(self, n: int) -> None:
         missing = n - len(self._first)
         if missing > 0:
             self._gain, self._critical = (np.pad(a, (0, missing)) for a in (self._gain, self._critical))

@@ -1,4 +1,4 @@
-"""How the splits are made from an expert database: what is held out, and how hard each row is."""
+"""Builds the splits from an expert database: holds out subjects and reaches, and measures how hard each row is."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from dextron_bench.storage import atomic
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
 
-NEAR_OFFSET = 0.001  # [m] settings of one reach whose offsets differ by less than this in x and y
-NEAR_NOISE = 0.02  # and whose duration noise differs by less than this are near-equal.
+# Two settings of one reach are near-equal if offsets in x and y, and duration noise, differ by less than these.
+NEAR_OFFSET = 0.001  # [m]
+NEAR_NOISE = 0.02
 RANGE = policies.CRITICAL_DISTANCE[1] - policies.CRITICAL_DISTANCE[0]  # Width of the range of d_c.
 SETTING = ["reach", "offset_x", "offset_y", "duration_noise"]
 COLUMNS = ["split", *SETTING, "gain", "critical", "window"]
@@ -27,7 +28,7 @@ COLUMNS = ["split", *SETTING, "gain", "critical", "window"]
 
 @dataclass(frozen=True)
 class Sizes:
-    """Rows of the splits, what is held out, and how finely d_c is scanned."""
+    """Numbers of rows, of held-out subjects, of points in a scan of d_c, and the fraction of held-out reaches."""
 
     evaluated: int = 500
     val: int = 200
@@ -38,42 +39,43 @@ class Sizes:
 
 
 class TooFewRows(ValueError):
-    """A database too small for the splits."""
+    """The database is too small for the splits."""
 
 
 def partition(
     source: setting.Source, database: pd.DataFrame, seed: int, sizes: Sizes, by_subject: bool
 ) -> dict[str, pd.DataFrame]:
-    """Rows of every split but `open` from the solved rows of a database; raises TooFewRows.
+    """The rows of every split except `open`, from the solved rows of a database; raises TooFewRows.
 
-    Held-out subjects and reaches are drawn at random. Evaluated splits have one row a setting; `train`
-    keeps every expert of its settings, less settings near-equal to an evaluated one.
+    Held-out subjects and reaches are drawn at random. The other splits have one row per setting; `train` has one row
+    per expert, without the settings that are near-equal to a setting of `val` or `test`.
     """
-    rng = np.random.default_rng([seed, 0, 1])  # Three words, where the blocks of a search have two.
+    rng = np.random.default_rng([seed, 0, 1])  # Three words: the blocks of a search use two.
     solved = database[database["score"] == task.SUCCESS].sample(frac=1.0, random_state=rng)
     subject = {name: source.stratum(name).subject for name in source.names}
     subjects = sorted(set(subject.values()))
-    away = set(rng.choice(subjects, sizes.subjects, replace=False)) if by_subject else set()
-    home = [name for name in source.names if subject[name] not in away]
-    unseen = set(rng.choice(home, round(len(home) * sizes.reaches), replace=False))
-    is_away, is_unseen = solved["reach"].map(subject).isin(away), solved["reach"].isin(unseen)
+    unseen_subjects = set(rng.choice(subjects, sizes.subjects, replace=False)) if by_subject else set()
+    others = [name for name in source.names if subject[name] not in unseen_subjects]
+    unseen_reaches = set(rng.choice(others, round(len(others) * sizes.reaches), replace=False))
+    of_subject = solved["reach"].map(subject).isin(unseen_subjects)
+    of_reach = solved["reach"].isin(unseen_reaches)
     once = solved.drop_duplicates(SETTING)
-    seen = once[~is_away[once.index] & ~is_unseen[once.index]]
+    seen = once[~of_subject[once.index] & ~of_reach[once.index]]
     parts = {
         "val": _take(seen, 0, sizes.val, "val"),
         "test": _take(seen, sizes.val, sizes.evaluated, "test"),
-        "unseen-reach": _take(once[is_unseen[once.index]], 0, sizes.evaluated, "unseen-reach"),
+        "unseen-reach": _take(once[of_reach[once.index]], 0, sizes.evaluated, "unseen-reach"),
     }
     if by_subject:
-        parts["unseen-subject"] = _take(once[is_away[once.index]], 0, sizes.evaluated, "unseen-subject")
-    held = pd.concat([parts["val"], parts["test"]])
-    parts["train"] = without_near_equal(solved[~is_away & ~is_unseen], held).sort_index()
+        parts["unseen-subject"] = _take(once[of_subject[once.index]], 0, sizes.evaluated, "unseen-subject")
+    held_out = pd.concat([parts["val"], parts["test"]])
+    parts["train"] = without_near_equal(solved[~of_subject & ~of_reach], held_out).sort_index()
     return parts
 
 
-def without_near_equal(rows: pd.DataFrame, held: pd.DataFrame) -> pd.DataFrame:
-    """The rows whose setting is not near-equal to one of the held-out rows."""
-    by_reach = {name: group[SETTING[1:]].to_numpy() for name, group in held.groupby("reach")}
+def without_near_equal(rows: pd.DataFrame, held_out: pd.DataFrame) -> pd.DataFrame:
+    """The rows whose setting is not near-equal to a setting of the held-out rows."""
+    by_reach = {name: group[SETTING[1:]].to_numpy() for name, group in held_out.groupby("reach")}
     limits = np.array([NEAR_OFFSET, NEAR_OFFSET, NEAR_NOISE])
 
     def near(row: tuple) -> bool:
@@ -85,7 +87,7 @@ def without_near_equal(rows: pd.DataFrame, held: pd.DataFrame) -> pd.DataFrame:
 
 
 def draw_open(source: setting.Source, parts: Iterable[pd.DataFrame], seed: int, sizes: Sizes) -> pd.DataFrame:
-    """Uniform settings and gains, solvable or not, near-equal to none of the other parts, with no d_c yet."""
+    """Uniform settings and gains, solvable or not, without d_c, near-equal to no setting of the other parts."""
     rng = np.random.default_rng([seed, 0, 2])
     count = 2 * sizes.open
     rows = setting.to_frame([source.sample(rng) for _ in range(count)]).assign(gain=rng.uniform(*policies.GAIN, count))
@@ -93,28 +95,28 @@ def draw_open(source: setting.Source, parts: Iterable[pd.DataFrame], seed: int, 
 
 
 def scan(source: setting.Source, rows: pd.DataFrame, engine: Engine, points: int) -> np.ndarray:
-    """Sums of rewards (rows, points) of experts with each row's gain and evenly spaced d_c (see `grid`)."""
+    """Sums of rewards (rows, points) of experts with each row's gain and the evenly spaced d_c of `grid`."""
     criticals = grid(points)
     paths = (source.path(case) for case in setting.from_frame(rows))
-    asked = (branching.ExpertBatch(p, gain, criticals) for p, gain in zip(paths, rows["gain"], strict=True))
+    batches = (branching.ExpertBatch(path, gain, criticals) for path, gain in zip(paths, rows["gain"], strict=True))
     scores = np.zeros((len(rows), points))
-    for number, found in branching.play(engine, asked):
-        scores[number] = found.returns
+    for number, outcomes in branching.play(engine, batches):
+        scores[number] = outcomes.returns
     return scores
 
 
 def grid(points: int) -> np.ndarray:
-    """The middles of equal bands of d_c."""
+    """The middles (points,) of equal bands of d_c."""
     return policies.CRITICAL_DISTANCE[0] + RANGE * (np.arange(points) + 0.5) / points
 
 
 def success_window(scores: np.ndarray) -> np.ndarray:
-    """Width of the range of d_c that succeeds, from a scan (rows, points); shape (rows,)."""
+    """Widths (rows,) of the range of d_c that succeeds, from a scan (rows, points)."""
     return RANGE * (scores == task.SUCCESS).mean(axis=1)
 
 
 def best_critical(scores: np.ndarray) -> np.ndarray:
-    """The d_c of highest sum of rewards in a scan (rows, points), in the middle of its longest run; shape (rows,)."""
+    """The best d_c (rows,) of a scan (rows, points): the middle of the longest run of points with the highest score."""
     return grid(scores.shape[1])[[_middle(row == row.max()) for row in scores]]
 
 
@@ -129,8 +131,8 @@ def build(
 ) -> dict[str, dict[str, Any]]:
     """Makes, scans and writes the splits of a source into `folder`; returns their entry in the catalogue.
 
-    `database` holds the kept rows of a search that tried so many experts a setting: for `train`, the search
-    itself is the scan.
+    `database` holds the kept rows of a search that tried `tried` experts per setting. The search is also the scan of
+    `train`.
     """
     sizes = sizes or Sizes()
     parts = partition(source, database, seed, sizes, by_subject=source.name == "real")
@@ -142,7 +144,7 @@ def build(
 
 
 def write(reaches: str, table: pd.DataFrame, folder: Path) -> dict[str, dict[str, Any]]:
-    """Writes a source's splits, one after another in `table`, into `folder`; returns their entry in its catalogue."""
+    """Writes the splits of a source, one after the other in `table`; returns their entry in the folder's catalogue."""
     atomic.write_atomically(folder / f"splits-{reaches}.parquet", lambda part: table.to_parquet(part))
     entry = {
         str(name): {"rows": len(rows), "digest": split_digest(rows)}
@@ -155,7 +157,7 @@ def write(reaches: str, table: pd.DataFrame, folder: Path) -> dict[str, dict[str
 
 
 def scan_split(source: setting.Source, name: str, rows: pd.DataFrame, engine: Engine, points: int) -> pd.DataFrame:
-    """A split's rows with their windows, and for `open` with the best d_c of the scan."""
+    """A split's rows with their windows of success; for `open` also with the best d_c of the scan."""
     once = rows.drop_duplicates(SETTING)
     scores = scan(source, once, engine, points)
     if name == "open":
@@ -166,14 +168,16 @@ def scan_split(source: setting.Source, name: str, rows: pd.DataFrame, engine: En
 
 
 def _take(rows: pd.DataFrame, first: int, count: int, name: str) -> pd.DataFrame:
-    taken = rows.iloc[first : first + count]
-    if len(taken) < count:
-        raise TooFewRows(f"split {name!r} needs {count} solved settings and the database has {len(taken)}; search on")
-    return taken
+    part = rows.iloc[first : first + count]
+    if len(part) < count:
+        raise TooFewRows(
+            f"split {name!r} needs {count} solved settings and the database has {len(part)}; continue the search"
+        )
+    return part
 
 
 def _middle(flags: Sequence[bool]) -> int:
-    """Index in the middle of the longest run of true flags."""
+    """The index in the middle of the longest run of true flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     runs = edges.reshape(-1, 2)
     start, stop = runs[np.argmax(runs[:, 1] - runs[:, 0])]

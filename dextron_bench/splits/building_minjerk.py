@@ -1,7 +1,7 @@
-"""How the splits of `minjerk` are made: one reach a row, solved by the one expert of that world.
+"""Builds the splits of `minjerk`: one reach per row, solved by the one expert of that environment.
 
-Its reaches have no offsets, and further ones are to be had by number. So `train` is drawn from the reaches that
-the source lists and samples, `val` and `test` from further ones, which nobody meets while training there.
+The reaches have no offsets, and every number gives another reach. `train` is drawn from the reaches that the source
+lists and samples. `val` and `test` are drawn from other reaches, which never occur in training.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ EXPERT = Expert(gain=2.0, critical=0.15)
 
 @dataclass(frozen=True)
 class Sizes:
-    """Rows of the splits, how finely d_c is scanned, and how many reaches are tried at a time."""
+    """Numbers of rows, of points in a scan of d_c, and of reaches that are tried at once."""
 
     train: int = 600
     val: int = 100
@@ -39,7 +39,7 @@ class Sizes:
 def build(folder: Path, engine: Engine, seed: int = 0, sizes: Sizes | None = None) -> dict[str, dict[str, Any]]:
     """Makes, scans and writes the splits of `minjerk` into `folder`; returns their entry in the catalogue.
 
-    Raises TooFewRows where REACHES listed or as many further reaches are not enough.
+    Raises TooFewRows if too few of the first REACHES reaches, or of the next REACHES reaches, are solved.
     """
     sizes = sizes or Sizes()
     source = MinjerkSource()
@@ -49,27 +49,27 @@ def build(folder: Path, engine: Engine, seed: int = 0, sizes: Sizes | None = Non
 
 
 def draw(source: MinjerkSource, engine: Engine, seed: int, sizes: Sizes) -> dict[str, pd.DataFrame]:
-    """Rows of every split, in an order drawn from the seed, with no windows yet."""
+    """The rows of every split, without windows, in an order drawn with the seed."""
     rng = np.random.default_rng([seed, 0, 3])
-    listed, further = rng.permutation(REACHES), REACHES + rng.permutation(REACHES)
+    listed, unlisted = rng.permutation(REACHES), REACHES + rng.permutation(REACHES)
     train = first_solved(source, listed, sizes.train, engine, sizes.batch)
-    held = first_solved(source, further, sizes.val + sizes.test, engine, sizes.batch)
-    return {"train": train, "val": held.iloc[: sizes.val], "test": held.iloc[sizes.val :]}
+    held_out = first_solved(source, unlisted, sizes.val + sizes.test, engine, sizes.batch)
+    return {"train": train, "val": held_out.iloc[: sizes.val], "test": held_out.iloc[sizes.val :]}
 
 
 def first_solved(source: MinjerkSource, numbers: np.ndarray, count: int, engine: Engine, batch: int) -> pd.DataFrame:
     """The first `count` rows, in the order of `numbers`, in which EXPERT scores 20; raises TooFewRows."""
-    found: list[setting.Setting] = []
-    for tried in np.split(numbers, range(batch, len(numbers), batch)):
-        found += _solved([setting.Setting(f"minjerk-{number:06d}", 0.0, 0.0, 0.0) for number in tried], source, engine)
-        if len(found) >= count:
-            return setting.to_frame(found[:count]).assign(gain=EXPERT.gain, critical=EXPERT.critical)
-    raise building.TooFewRows(f"{count} solved minjerk reaches are asked for and there are {len(found)}")
+    solved: list[setting.Setting] = []
+    for part in np.split(numbers, range(batch, len(numbers), batch)):
+        solved += _solved([setting.Setting(f"minjerk-{number:06d}", 0.0, 0.0, 0.0) for number in part], source, engine)
+        if len(solved) >= count:
+            return setting.to_frame(solved[:count]).assign(gain=EXPERT.gain, critical=EXPERT.critical)
+    raise building.TooFewRows(f"the splits need {count} solved minjerk reaches and there are {len(solved)}")
 
 
-def _solved(tried: list[setting.Setting], source: MinjerkSource, engine: Engine) -> Iterator[setting.Setting]:
-    """Those settings in which EXPERT scores 20, in their order."""
+def _solved(settings: list[setting.Setting], source: MinjerkSource, engine: Engine) -> Iterator[setting.Setting]:
+    """The settings in which EXPERT scores 20, in their order."""
     criticals = np.array([EXPERT.critical])
-    asked = (branching.ExpertBatch(source.path(each), EXPERT.gain, criticals) for each in tried)
-    returns = {number: answer.returns[0] for number, answer in branching.play(engine, asked)}
-    yield from (each for number, each in enumerate(tried) if returns[number] == task.SUCCESS)
+    batches = (branching.ExpertBatch(source.path(one), EXPERT.gain, criticals) for one in settings)
+    returns = {number: outcomes.returns[0] for number, outcomes in branching.play(engine, batches)}
+    yield from (one for number, one in enumerate(settings) if returns[number] == task.SUCCESS)

@@ -1,4 +1,4 @@
-"""Splits: frozen, content-hashed lists of settings, each with an expert and its window of success."""
+"""Splits: frozen, content-hashed lists of settings; each row has an expert and its window of success."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ EVALUATED = ("test", "unseen-reach", "unseen-subject")
 
 
 class UnknownRow(LookupError):
-    """A row that a split does not have."""
+    """A split has no row of that number."""
 
 
 class UnknownSplit(KeyError):
-    """A split that a source of reaches does not have."""
+    """A source of reaches has no split of that name."""
 
-    def __init__(self, name: str, reaches: str, known: Sequence[str]) -> None:
-        choice = f"choose from {', '.join(known)}" if known else "none ships; see `dextron-bench list`"
+    def __init__(self, name: str, reaches: str, names: Sequence[str]) -> None:
+        choice = f"choose from {', '.join(names)}" if names else "none ships; see `dextron-bench list`"
         super().__init__(f"no split {name!r} of {reaches!r} reaches; {choice}")
 
     def __str__(self) -> str:
@@ -37,12 +37,12 @@ class UnknownSplit(KeyError):
 
 
 class DamagedSplit(ValueError):
-    """A split whose content is not what its hash says."""
+    """A split cannot be read, or its content differs from its hash."""
 
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """A named list of cases; `digest` is the SHA-256 of its content, and so its version."""
+    """A named list of cases; `digest`, the SHA-256 of its content, is its version."""
 
     name: str
     reaches: str
@@ -62,46 +62,46 @@ def known_splits(reaches: str) -> tuple[str, ...]:
 
 
 def ranking_splits(reaches: str) -> tuple[str, ...]:
-    """Names of the shipped splits that rank methods; raises UnknownSplit where there are none."""
-    found = tuple(name for name in known_splits(reaches) if name in EVALUATED)
-    if not found:
+    """Names of the shipped splits that rank methods; raises UnknownSplit if the source has none."""
+    names = tuple(name for name in known_splits(reaches) if name in EVALUATED)
+    if not names:
         raise UnknownSplit(EVALUATED[0], reaches, known_splits(reaches))
-    return found
+    return names
 
 
 def all_splits() -> list[tuple[str, str]]:
-    """Every shipped split, as (source of reaches, name)."""
+    """Source of reaches and name of every shipped split."""
     return [(reaches, name) for reaches in _catalogue() for name in known_splits(reaches)]
 
 
 def load_split(reaches: str, name: str) -> Split:
-    """The split of that name; raises UnknownSplit, DamagedSplit."""
+    """The shipped split of a name, verified against its hash; raises UnknownSplit, DamagedSplit."""
     if name not in known_splits(reaches):
         raise UnknownSplit(name, reaches, known_splits(reaches))
     table = _table(reaches)
     try:
         rows = table[table["split"] == name]
-        found, frozen = split_digest(rows), _catalogue()[reaches][name]["digest"]
+        digest, expected = split_digest(rows), _catalogue()[reaches][name]["digest"]
     except (KeyError, ValueError, TypeError) as error:
         raise DamagedSplit(f"the splits of {reaches!r} reaches lack {error}; reinstall the package") from error
-    if found != frozen:
+    if digest != expected:
         raise DamagedSplit(
-            f"split {name!r} of {reaches!r} reaches is damaged (hash {found[:12]}); reinstall the package"
+            f"split {name!r} of {reaches!r} reaches is damaged (hash {digest[:12]}); reinstall the package"
         )
-    return Split(name, reaches, tuple(cases_from_frame(rows)), found)
+    return Split(name, reaches, tuple(cases_from_frame(rows)), digest)
 
 
 def cases_from_frame(rows: pd.DataFrame) -> list[Case]:
     """The cases of a table with the columns of a setting, `gain`, `critical` and `window`."""
     experts = zip(rows["gain"], rows["critical"], rows["window"], strict=True)
     return [
-        Case(each, Expert(float(gain), float(critical)), float(window))
-        for each, (gain, critical, window) in zip(setting.from_frame(rows), experts, strict=True)
+        Case(one, Expert(float(gain), float(critical)), float(window))
+        for one, (gain, critical, window) in zip(setting.from_frame(rows), experts, strict=True)
     ]
 
 
 def split_digest(rows: pd.DataFrame) -> str:
-    """SHA-256 of a split's rows in order: names as UTF-8, numbers as little-endian float64."""
+    """SHA-256 of a split's rows in order: names of reaches as UTF-8, numbers as little-endian float64."""
     names = "\n".join(rows["reach"]).encode()
     return hashing.digest(names, *(np.ascontiguousarray(rows[c], "<f8").tobytes() for c in NUMBERS))
 

@@ -1,4 +1,4 @@
-"""Groups of a split's rows by which scores are told apart: the subject who reached, and where the hand started."""
+"""Groups of a split's rows: by subject, and by the region in which the hand starts."""
 
 from __future__ import annotations
 
@@ -16,42 +16,41 @@ SUBJECT, REGION = ("subject",), ("ring", "angle")  # What `by_stratum` groups by
 
 
 def strata(split: Split) -> pd.DataFrame:
-    """A row for each of the split's, in order: `subject`, `ring` 0 (near) to 3 (far), `angle` 0 (-x) to 3 (-y).
+    """Columns `subject`, `ring` 0 (near) to 3 (far) and `angle` 0 (-x) to 3 (-y), for each row of a split in order.
 
-    The recorded reaches' names say this, so that a table of them needs none of the recordings. Raises UnknownReach.
+    For recorded reaches their names are enough; the recordings need not be imported. Raises UnknownReach.
     """
     names = [case.setting.reach for case in split.cases]
     if split.reaches == "real":
         rows = [parsing.subject_and_region(name) for name in names]
     else:
         source = sources.open_source(split.reaches)
-        found = [source.stratum(name) for name in names]
-        rows = [(each.subject, each.ring, each.angle) for each in found]
+        rows = [(stratum.subject, stratum.ring, stratum.angle) for stratum in map(source.stratum, names)]
     return pd.DataFrame(rows, columns=["subject", "ring", "angle"])
 
 
 def shipped_strata(reaches: str, name: str, digest: str) -> pd.DataFrame | None:
-    """The strata of a shipped split's rows; None where no split of that name and digest ships. Raises DamagedSplit."""
+    """The strata of a shipped split's rows; None if no split of that name and digest ships. Raises DamagedSplit."""
     if name not in known_splits(reaches) or (split := load_split(reaches, name)).digest != digest:
         return None
     return strata(split)
 
 
 def start_regions(reaches: str, name: str, digest: str) -> np.ndarray | None:
-    """The start regions (rows,) of a shipped split's rows as numbers 0 to 15, 4 ring + angle; None as `shipped`."""
-    found = shipped_strata(reaches, name, digest)
-    return None if found is None else (4 * found["ring"] + found["angle"]).to_numpy()
+    """Start regions (rows,) of a shipped split as numbers 0 to 15, 4 ring + angle; None if `shipped_strata` is None."""
+    rows = shipped_strata(reaches, name, digest)
+    return None if rows is None else (4 * rows["ring"] + rows["angle"]).to_numpy()
 
 
 def by_stratum(scores: np.ndarray, rows: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Mean return and success rate of scores (seeds, rows) in each group of a split's rows, those of `strata`.
+    """Mean return and success rate of scores (seeds, rows) in each group of rows, which come from `strata`.
 
-    `by` is SUBJECT or REGION; its columns come first, then `rows` (how many), `return` (0 to 20), `success` (0 to 1).
-    Groups without rows are left out.
+    `by` is SUBJECT or REGION. Columns: `by`, then `rows` (how many), `return` (0 to 20), `success` (0 to 1). Groups
+    without rows are left out.
     """
-    each = rows[list(by)].assign(score=scores.mean(axis=0), solved=np.equal(scores, task.SUCCESS).mean(axis=0))
+    scored = rows[list(by)].assign(score=scores.mean(axis=0), solved=np.equal(scores, task.SUCCESS).mean(axis=0))
     return (
-        each.groupby(list(by))
+        scored.groupby(list(by))
         .agg(**{"rows": ("score", "size"), "return": ("score", "mean"), "success": ("solved", "mean")})
         .reset_index()
     )

@@ -43,5 +43,5 @@ def test_frozen_lets_gradients_through_to_the_input_alone():
 def test_follow_moves_by_the_rate():
     target, leader = made(0).copy(), made(1)
     wanted = 0.75 * target.parameters[2] + 0.25 * leader.parameters[2].detach()
-    target.follow(leader, 0.25)
+    target.average_with(leader, 0.25)
     assert_close(target.parameters[2], wanted)

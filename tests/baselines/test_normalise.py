@@ -11,7 +11,7 @@ from baselines.normalise import EPSILON, PRIOR, Moments
 def test_moments_are_those_of_all_values_seen(values):
     moments = Moments(1, 1)
     for value in values:
-        moments.see(np.array([[value]]))
+        moments.update(np.array([[value]]))
     spread = max(1.0, float(np.abs(values).max()))
     assert abs(moments.mean[0, 0] - np.mean(values)) < 1e-3 * spread
     assert abs(moments.variance[0, 0] - np.var(values)) < 1e-3 * spread**2
@@ -21,7 +21,7 @@ def test_moments_are_those_of_all_values_seen(values):
 def test_agents_have_streams_of_their_own():
     moments = Moments(2, 1)
     for values in ([1.0, 10.0], [3.0, 10.0]):
-        moments.see(np.array(values)[:, None])
+        moments.update(np.array(values)[:, None])
     np.testing.assert_allclose(moments.mean[:, 0], [2.0, 10.0], rtol=1e-3)
     np.testing.assert_allclose(moments.deviation[:, 0], [1.0, 0.0], atol=0.08)
     assert Moments(1, 1).deviation[0, 0] == np.sqrt(1.0 + EPSILON)

@@ -131,7 +131,7 @@ def test_what_it_cannot_act_with_is_told(tmp_path: Path):
         Omega(model=str(tmp_path / "none.safetensors")).for_source("real")
     with pytest.raises(NoModel, match=r"takes the file of a model .* or one of real, synthetic.*'nofile'"):
         Omega(model="nofile").for_source("real")
-    with pytest.raises(BadRule, match="--tolerance is 2; a difference of chances lies between 0 and 1"):
+    with pytest.raises(BadRule, match="--tolerance is 2; a difference of probabilities lies between 0 and 1"):
         Omega(tolerance=2.0)
     with pytest.raises(BadRule, match="--near is -1"):
         Omega(near=-1.0)
@@ -142,7 +142,7 @@ def test_a_method_is_made_for_the_reaches_of_its_run(tmp_path: Path):
     made = registry.create("omega", {"model": str(file)}, "real")
     assert registry.settings_of(made)["sha256"] == hashing.sha256(file)
     assert registry.create("exp", {}, "real") == registry.create("exp")
-    with pytest.raises(registry.BadSettings, match="'omega': no success model at hand"):
+    with pytest.raises(registry.BadSettings, match="'omega': there is no success model"):
         registry.create("omega", {}, "minjerk")
 
 

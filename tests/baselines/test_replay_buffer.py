@@ -16,7 +16,7 @@ def lived(*names: float, terminated: bool = False) -> Transitions:
 
 def everything(replay: Replay, agent: int = 0) -> set[tuple[float, ...]]:
     size = replay.sizes[agent]
-    found = replay.pick(np.tile((np.arange(size) + 0.5) / size, (len(replay.sizes), 1)))
+    found = replay.select(np.tile((np.arange(size) + 0.5) / size, (len(replay.sizes), 1)))
     columns = (found.states[agent, :, 0], found.actions[agent], found.rewards[agent], found.nexts[agent, :, 47])
     return set(zip(*(column.tolist() for column in columns), strict=True))
 
@@ -26,7 +26,7 @@ def test_transitions_come_back_with_their_successors_across_the_ends_of_episodes
     for name, ended in ((1, False), (2, True), (7, False), (8, False)):
         replay.add(lived(name, name + 20, terminated=name == 2), np.array([ended, False]))
     assert everything(replay) == {(1, 10, 100, 2), (2, 20, 200, 3), (7, 70, 700, 8), (8, 80, 800, 9)}
-    last = replay.pick(np.array([[0.26], [0.99]]))
+    last = replay.select(np.array([[0.26], [0.99]]))
     assert last.terminated.tolist() == [[True], [False]]
     assert last.states[1, 0, 5] == 28.0
 
@@ -35,7 +35,7 @@ def test_numbers_in_the_unit_interval_point_at_transitions_evenly():
     replay = Replay(1, 50)
     for name in range(4):
         replay.add(lived(name), np.array([False]))
-    picked = replay.pick(np.array([[0.0, 0.24, 0.25, 0.74, 0.75, 0.999]]))
+    picked = replay.select(np.array([[0.0, 0.24, 0.25, 0.74, 0.75, 0.999]]))
     assert picked.states[0, :, 0].tolist() == [0, 0, 1, 2, 3, 3]
 
 

@@ -71,7 +71,7 @@ def test_seeds_together_learn_what_each_learns_alone():
         both, noise = batch(rng, 2), torch.tensor(rng.normal(size=(2, 4, 1)), dtype=torch.float32)
         together.update(both, noise)
         alone.update(Batch(*(getattr(both, name)[1:] for name in Batch.__slots__)), noise[1:])
-    for found, wanted in zip(together.learned, alone.learned, strict=True):
+    for found, wanted in zip(together.trained_parameters, alone.trained_parameters, strict=True):
         assert_close(found[1:], wanted, atol=1e-4, rtol=1e-3)
 
 
