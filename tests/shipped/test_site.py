@@ -15,8 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.browser import open_browser
+
 ROOT = Path(__file__).parents[2]
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 EXTRA = ("material", "mkdocstrings_handlers")
 PHONE, DESKTOP = {"width": 390, "height": 844}, {"width": 1440, "height": 900}
 
@@ -102,15 +103,10 @@ def test_a_public_name_without_a_page_fails(checkout: Path):
 
 
 def test_pages_ask_this_server_alone_and_fit_a_phone(site: Path, address: str):
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install -e '.[dev]'")
-    if BROWSER is None:
-        pytest.skip("no browser is installed (Debian: apt-get install chromium)")
     pages = [file.relative_to(site).as_posix() for file in sorted(site.rglob("*.html"))]
     requests: list[str] = []
     errors: list[str] = []
-    with api.sync_playwright() as playwright:
-        arguments = ["--disable-background-networking", *(["--no-sandbox"] if os.geteuid() == 0 else [])]
-        browser = playwright.chromium.launch(executable_path=BROWSER, args=arguments)
+    with open_browser() as browser:
         page = browser.new_page(viewport=PHONE)
         page.on("request", lambda request: requests.append(request.url))
         page.on("pageerror", lambda error: errors.append(str(error)))
@@ -123,7 +119,6 @@ def test_pages_ask_this_server_alone_and_fit_a_phone(site: Path, address: str):
         page.locator(".md-search__input").click()
         page.keyboard.type("countdown")
         page.locator(".md-search-result__item").first.wait_for()
-        browser.close()
     assert len(pages) > 30
     assert errors == []
     assert {url for url in requests if not url.startswith((address, "data:", "blob:"))} == set()
