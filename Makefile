@@ -40,6 +40,7 @@ check: $(ENVIRONMENT)
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m pyright --pythonpath $(PYTHON)
+	$(PYTHON) -m pytest -q -n 0 tests/test_english.py
 	$(MAKE) test
 	$(PYTHON) -m pytest -q -n 2 -m slow
 

@@ -73,7 +73,7 @@ def compared(content: bytes, shipped: bytes) -> str:
     total = sum(a.size for a, _ in pairs.values())
     differ = sum(int((a != b).sum()) for a, b in pairs.values())
     if not differ:
-        return "all numbers equal those of the shipped file, but the bytes differ"
+        return "all numbers are as in the shipped file, but the bytes differ"
     distances = {name: float(abs(a - b).max() / abs(b).max()) for name, (a, b) in pairs.items()}
     worst = max(distances, key=distances.__getitem__)
     return (

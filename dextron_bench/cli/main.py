@@ -98,7 +98,7 @@ Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or inpu
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command and returns its exit code; `arguments` default to those of the process."""
+    """Runs one command and returns its exit code; `arguments` default to `sys.argv`."""
     _limit_blas_threads()
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words or bool(os.environ.get("DEXTRON_DEBUG"))

@@ -106,7 +106,7 @@ def _section(title: str, content: Sequence[Html]) -> Html | None:
 
 
 def _script_hash(script: str) -> str:
-    """The hash by which the content security policy allows the page's script."""
+    """The script's hash for the content security policy."""
     return "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
