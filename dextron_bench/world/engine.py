@@ -1,4 +1,4 @@
-"""N episodes at once on a MuJoCo batch; the one place that steps physics in bulk."""
+"""Plays N episodes in parallel on a MuJoCo batch. Only this module steps many simulations at once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dextron_bench.world import model, task
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What one control step brought, each array (n,) beside states (n, 48)."""
+    """The result of one control step: states (n, 48), and the other arrays of shape (n,)."""
 
     states: np.ndarray
     rewards: np.ndarray
@@ -23,44 +23,43 @@ class Step:
 
     @property
     def ended(self) -> np.ndarray:
-        """True where the episode is over, shape (n,)."""
+        """True for episodes that are over, shape (n,)."""
         return self.terminated | self.truncated
 
 
 class Engine:
-    """Slots for episodes that are begun, stepped and forked independently.
+    """Slots for episodes. Each slot begins, steps and forks independently of the others.
 
-    Equal paths and actions give bit-equal episodes whatever the slot, the number of slots and of threads.
+    Equal paths and actions give bit-equal episodes in every slot, for any number of slots and threads.
     """
 
     def __init__(self, slots: int, threads: int = 0) -> None:
-        """Makes room for `slots` episodes on `threads` threads (0: one per processor)."""
-        compiled = model.load()
-        self._batch = Batch(compiled, slots, threads)
+        """Allocates `slots` slots that step on `threads` threads (0: one per processor)."""
+        self._batch = Batch(model.load(), slots, threads)
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         self._ctrl = self._batch.bind("ctrl")
         self._mocap_pos = self._batch.bind("mocap_pos")
         self._mocap_quat = self._batch.bind("mocap_quat")
         self._batch.reset()
-        self._fresh = self._batch.state[0].copy()
+        self._initial_state = self._batch.state[0].copy()
         self._progress = task.Progress.empty(slots)
-        longest = task.STEP_LIMIT + 1
-        self._positions = np.zeros((slots, longest, 3))
-        self._quaternions = np.zeros((slots, longest, 4))
+        poses = task.STEP_LIMIT + 1
+        self._positions = np.zeros((slots, poses, 3))
+        self._quaternions = np.zeros((slots, poses, 4))
 
     @property
     def slots(self) -> int:
-        """Number of episodes there is room for."""
+        """Number of slots."""
         return len(self._qpos)
 
     def begin(self, ids: np.ndarray, paths: Sequence[Path]) -> np.ndarray:
-        """Starts an episode in each slot of `ids` (n,) along its path; returns the first states (n, 48)."""
+        """Begins an episode along a path in each slot of `ids` (n,), and returns the first states (n, 48)."""
         lengths = np.array([len(path) for path in paths])
         for slot, path in zip(ids, paths, strict=True):
             n = min(len(path), self._positions.shape[1])
             self._positions[slot, :n], self._positions[slot, n:] = path.positions[:n], path.positions[n - 1]
             self._quaternions[slot, :n], self._quaternions[slot, n:] = path.quaternions[:n], path.quaternions[n - 1]
-        self._batch.state[ids] = self._fresh
+        self._batch.state[ids] = self._initial_state
         qpos = np.tile(model.half_closed(), (len(ids), 1))
         qpos[:, model.PALM_POSITION] = self._positions[ids, 0] + PALM_AHEAD
         qpos[:, model.PALM_QUATERNION] = self._quaternions[ids, 0]
@@ -71,11 +70,11 @@ class Engine:
         return states
 
     def states(self, ids: np.ndarray) -> np.ndarray:
-        """A copy of the states (n, 48) of slots `ids`."""
+        """A copy of the states (n, 48) of slots `ids` (n,)."""
         return np.concatenate([self._qpos[ids], self._qvel[ids]], axis=1)
 
     def step(self, ids: np.ndarray, actions: np.ndarray) -> Step:
-        """Advances slots `ids` (n,) by one control step under actions (n, 1) in [-1, 1]."""
+        """Advances slots `ids` (n,) by one control step with actions (n, 1) in [-1, 1]."""
         self._ctrl[ids] = task.commands(actions)
         pose = self._progress.step[ids] + 1
         self._mocap_pos[ids, 0], self._mocap_quat[ids, 0] = self._positions[ids, pose], self._quaternions[ids, pose]
@@ -84,21 +83,22 @@ class Engine:
         return Step(states, *self._progress.advance(ids, states))
 
     def fork(self, source: np.ndarray, target: np.ndarray) -> None:
-        """Copies the episodes of slots `source` (n,), as they stand, into slots `target` (n,)."""
+        """Copies the episodes of slots `source` (n,), in their present state, into slots `target` (n,)."""
         for rows in (self._batch.state, self._positions, self._quaternions):
             rows[target] = rows[source]
         self._progress.copy(source, target)
 
     def save(self, ids: np.ndarray) -> dict[str, np.ndarray]:
-        """Copies of all that the episodes in slots `ids` (n,) go on from, but their paths."""
-        return {name: rows[ids].copy() for name, rows in self._rows().items()}
+        """Copies of everything that the episodes in slots `ids` (n,) need to continue, except their paths."""
+        return {name: rows[ids].copy() for name, rows in self._episode_arrays().items()}
 
     def load(self, ids: np.ndarray, saved: dict[str, np.ndarray]) -> None:
-        """Puts slots `ids` (n,), begun on the same paths, where those were that `save` was told of."""
-        for name, rows in self._rows().items():
+        """Restores episodes from `save` in slots `ids` (n,), which must have begun on the same paths."""
+        for name, rows in self._episode_arrays().items():
             rows[ids] = saved[name]
 
-    def _rows(self) -> dict[str, np.ndarray]:
+    def _episode_arrays(self) -> dict[str, np.ndarray]:
+        """The arrays with one row for each slot, by the names that they have in checkpoints."""
         return {
             "state": self._batch.state,
             **{field.name: getattr(self._progress, field.name) for field in fields(self._progress)},

@@ -1,4 +1,4 @@
-"""What the dm_control and Gymnasium faces share: which setting comes next, and which actions are refused."""
+"""Shared by the dm_control and Gymnasium environments: the validation of actions, and the order of settings."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from dextron_bench.reaches.sources import open_source
 
 
 class ActionError(ValueError):
-    """An action that the world does not take; the message says what it was and what it must be."""
+    """An invalid action; the message has its value and the valid ones."""
 
 
 def validated_action(actions: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """The actions as 64-bit floats of that shape; raises ActionError.
+    """The actions as 64-bit floats of that shape. Raises ActionError.
 
-    Refused are other shapes, NaN, and anything beyond [-1, 1] by however little: nothing is clipped, so
-    that an action means the same in training, in evaluation and in a replay.
+    It refuses other shapes, NaN, and every value outside [-1, 1]. It does not clip values, so an action means the same
+    in training, in evaluation and in a replay.
     """
     try:
         values = np.asarray(actions, dtype=np.float64)
@@ -26,30 +26,30 @@ def validated_action(actions: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         raise ActionError(f"actions must be numbers of shape {shape}; got {actions!r}") from None
     if values.shape != shape:
         raise ActionError(f"actions must have shape {shape}; got {values.shape}")
-    refused = values[~((values >= -1.0) & (values <= 1.0))]  # Written so that NaN is refused too.
-    if refused.size:
-        raise ActionError(f"actions must lie in [-1, 1] and are not clipped; got {float(refused[0])!r}")
+    invalid = values[~((values >= -1.0) & (values <= 1.0))]  # This form also selects NaN.
+    if invalid.size:
+        raise ActionError(f"actions must lie in [-1, 1] and are not clipped; got {float(invalid[0])!r}")
     return values
 
 
 class SettingQueue:
-    """Deals one setting an episode: those of a list, over and over, or fresh draws from the source."""
+    """Returns one setting for each episode: the settings of a list in turn, or random ones from the source."""
 
     def __init__(self, reaches: str | Source, settings: Sequence[Setting] | None = None) -> None:
-        """Takes a source or its name; raises UnknownSource, and ValueError where the list is empty."""
+        """Takes a source or its name. Raises UnknownSource, and ValueError if the list is empty."""
         if settings is not None and not settings:
-            raise ValueError("settings is an empty list; give at least one, or None to draw from the source")
+            raise ValueError("settings is an empty list; pass at least one setting, or None to draw from the source")
         self.source = open_source(reaches) if isinstance(reaches, str) else reaches
-        self._listed = settings
-        self._dealt = 0
+        self._settings = settings
+        self._position = 0
 
     def rewind(self) -> None:
-        """Goes back to the first setting of the list."""
-        self._dealt = 0
+        """Returns to the first setting of the list."""
+        self._position = 0
 
     def next(self, rng: np.random.Generator) -> Setting:
-        """The next episode's setting; `rng` is read only where there is no list."""
-        if self._listed is None:
+        """The setting of the next episode. Draws from `rng` only if there is no list."""
+        if self._settings is None:
             return self.source.sample(rng)
-        self._dealt += 1
-        return self._listed[(self._dealt - 1) % len(self._listed)]
+        self._position += 1
+        return self._settings[(self._position - 1) % len(self._settings)]

@@ -1,7 +1,7 @@
 """The task as Gymnasium environments, registered as dextron_bench/Grasp-v0.
 
-Every reset and step reports in its info the episode's `setting`, its `episode_return` so far, and whether it
-already `is_success`.
+The info of every reset and step has the `setting` of the episode, its `episode_return` so far, and `is_success`, which
+is true once the return is that of a success.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from dextron_bench.world.engine import Engine
 from dextron_bench.world.environment import SettingQueue, validated_action
 
 FRAME = (480, 360)  # [px] width and height of rendered frames.
-LARGEST = 1e10  # MuJoCo calls a simulation with numbers beyond this unstable.
+STATE_BOUND = 1e10  # Above this, MuJoCo declares a simulation unstable.
 RENDERING: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": round(1.0 / model.CONTROL_STEP)}
 
 
 def observation_space() -> Box:
-    """States (48,); no stable simulation goes beyond these bounds."""
-    return Box(-LARGEST, LARGEST, (model.STATE,), np.float64)
+    """States (48,). No stable simulation exceeds these bounds."""
+    return Box(-STATE_BOUND, STATE_BOUND, (model.STATE,), np.float64)
 
 
 def action_space() -> Box:
@@ -37,15 +37,15 @@ def action_space() -> Box:
     return Box(-1.0, 1.0, (1,), np.float64)
 
 
-def pictures(states: np.ndarray) -> np.ndarray:
+def render_frames(states: np.ndarray) -> np.ndarray:
     """Pictures (n, H, W, 3), 8 bit, of states (n, 48)."""
-    from dextron_bench.world.rendering import renderer  # Loads OpenGL, which most runs never need.
+    from dextron_bench.world.rendering import renderer  # Loads OpenGL, which most runs do not need.
 
     return renderer.frames(states, *FRAME)
 
 
 class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """One episode at a time."""
+    """Plays one episode at a time."""
 
     metadata = RENDERING
 
@@ -55,9 +55,9 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         settings: Sequence[Setting] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        """Plays `settings` over and over, or draws from a source of reaches, given by itself or its name.
+        """Plays `settings` in turn, again and again, or draws settings from a source of reaches.
 
-        Raises UnknownSource, and MissingData for `real` before its import.
+        Takes the source or its name. Raises UnknownSource, and MissingData for `real` before its import.
         """
         self.observation_space, self.action_space = observation_space(), action_space()
         self.render_mode = render_mode
@@ -68,7 +68,7 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begins the next episode, or that of `options["setting"]`. A seed also goes back to the first setting."""
+        """Begins the next episode, or the one of `options["setting"]`. A seed also returns to the first setting."""
         super().reset(seed=seed)
         if seed is not None:
             self._settings.rewind()
@@ -79,27 +79,28 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return states[0], self._info()
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """One control step; raises ActionError, and ResetNeeded outside an episode."""
+        """Advances one control step. Raises ActionError, and ResetNeeded outside an episode."""
         if not self._live:
-            raise ResetNeeded("no episode is under way; call reset() first")
+            raise ResetNeeded("no episode is running; call reset() first")
         step = self._engine.step(self._slot, validated_action(action, (1,))[None])
         self._live, reward = not step.ended[0], float(step.rewards[0])
         self._return += reward
         return step.states[0], reward, bool(step.terminated[0]), bool(step.truncated[0]), self._info()
 
     def render(self) -> np.ndarray | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """A picture (H, W, 3) of how things stand; None without a render mode."""
-        return pictures(self._engine.states(self._slot))[0] if self.render_mode == "rgb_array" else None
+        """A picture (H, W, 3) of the present state; None without a render mode."""
+        return render_frames(self._engine.states(self._slot))[0] if self.render_mode == "rgb_array" else None
 
     def _info(self) -> dict[str, Any]:
-        won = self._return >= task.SUCCESS
-        return {"setting": self._setting, "episode_return": self._return, "is_success": won}
+        success = self._return >= task.SUCCESS
+        return {"setting": self._setting, "episode_return": self._return, "is_success": success}
 
 
 class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
-    """Many episodes at once on one engine; equal to as many `GraspEnv`s, and far faster.
+    """Plays many episodes in parallel on one engine: the same as many `GraspEnv`s, but much faster.
 
-    The step after an episode's last begins that slot's next one: it ignores the action and rewards 0.
+    The step after the last step of an episode begins the next episode of that slot. It ignores the action, and its
+    reward is 0.
     """
 
     metadata = RENDERING | {"autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -112,7 +113,7 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         threads: int = 0,
         render_mode: str | None = None,
     ) -> None:
-        """As `GraspEnv`; `settings` are dealt to slots in the order in which these fall free.
+        """Like `GraspEnv`. Each slot that becomes free takes the next one of `settings`.
 
         `threads` as in `Engine`. Raises UnknownSource, and MissingData for `real` before its import.
         """
@@ -122,7 +123,7 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._settings, self._engine = SettingQueue(reaches, settings), Engine(num_envs, threads)
         self._rngs = [np_random()[0] for _ in range(num_envs)]
-        self._played = np.empty(num_envs, object)
+        self._playing = np.empty(num_envs, object)
         self._states, self._returns = np.zeros((num_envs, model.STATE)), np.zeros(num_envs)
         self._ended: np.ndarray | None = None
 
@@ -132,19 +133,19 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """Begins an episode in every slot. Slot k is seeded by `seed + k`, or by the k-th of a list."""
         if seed is not None:
             seeds = [seed + k for k in range(self.num_envs)] if isinstance(seed, int) else seed
-            given = zip(seeds, self._rngs, strict=True)
-            self._rngs = [rng if one is None else np_random(one)[0] for one, rng in given]
+            pairs = zip(seeds, self._rngs, strict=True)
+            self._rngs = [rng if slot_seed is None else np_random(slot_seed)[0] for slot_seed, rng in pairs]
             self._settings.rewind()
         self._ended = np.zeros(self.num_envs, bool)
         self._begin(np.arange(self.num_envs))
         return self._states.copy(), self._info()
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """One control step of every slot; raises ActionError, and ResetNeeded before the first reset."""
+        """Advances every slot by one control step. Raises ActionError, and ResetNeeded before the first reset."""
         if self._ended is None:
-            raise ResetNeeded("no episodes are under way; call reset() first")
+            raise ResetNeeded("no episodes are running; call reset() first")
         actions = validated_action(actions, (self.num_envs, 1))
-        live, over = np.flatnonzero(~self._ended), np.flatnonzero(self._ended)
+        live, ended = np.flatnonzero(~self._ended), np.flatnonzero(self._ended)
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), bool)
         if len(live):
@@ -152,22 +153,22 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             self._states[live], rewards[live] = step.states, step.rewards
             terminated[live], truncated[live] = step.terminated, step.truncated
         self._returns += rewards
-        if len(over):
-            self._begin(over)
+        if len(ended):
+            self._begin(ended)
         self._ended = terminated | truncated
         return self._states.copy(), rewards, terminated, truncated, self._info()
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """A picture (H, W, 3) of every slot; None without a render mode."""
-        return tuple(pictures(self._states)) if self.render_mode == "rgb_array" else None
+        """Pictures (H, W, 3), one of each slot; None without a render mode."""
+        return tuple(render_frames(self._states)) if self.render_mode == "rgb_array" else None
 
     def _begin(self, slots: np.ndarray) -> None:
         for slot in slots:
-            self._played[slot] = self._settings.next(self._rngs[slot])
-        self._states[slots] = self._engine.begin(slots, [self._settings.source.path(s) for s in self._played[slots]])
+            self._playing[slot] = self._settings.next(self._rngs[slot])
+        self._states[slots] = self._engine.begin(slots, [self._settings.source.path(s) for s in self._playing[slots]])
         self._returns[slots] = 0.0
 
     def _info(self) -> dict[str, Any]:
-        won = self._returns >= task.SUCCESS
-        info = {"setting": self._played.copy(), "episode_return": self._returns.copy(), "is_success": won}
+        success = self._returns >= task.SUCCESS
+        info = {"setting": self._playing.copy(), "episode_return": self._returns.copy(), "is_success": success}
         return info | {f"_{key}": np.ones(self.num_envs, bool) for key in info}

@@ -1,4 +1,4 @@
-"""The MuJoCo model of hand, bottle and table; the only home of its element names."""
+"""The MuJoCo model of hand, bottle and table. Only this module uses the names of its elements."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from dextron_bench.reaches.timing import CONTROL_STEP
 
 DIGITS = ("thumb", "index", "middle", "ring", "little")
 STATE = 48  # qpos (25), then qvel (23).
-THUMB_OPPOSED = 1.05  # [rad] where the thumb's base is held.
+THUMB_OPPOSED = 1.05  # [rad] constant angle of the thumb's base.
 HALF_CLOSED = 0.5  # Closure of every digit at the start of an episode.
 REFERENCE_RANGE = 1.57  # [rad] joint range whose velocity command equals the action.
 
-# Where things stand in a state: free joints are position (3) and quaternion wxyz (4).
+# Indices in a state. A free joint has a position (3) and a quaternion wxyz (4).
 BOTTLE_POSITION = slice(0, 3)
 BOTTLE_QUATERNION = slice(3, 7)
 PALM_POSITION = slice(7, 10)
 PALM_QUATERNION = slice(10, 14)
-FREE_PLACE, FREE_SPEED = ("x", "y", "z", "qw", "qx", "qy", "qz"), ("vx", "vy", "vz", "wx", "wy", "wz")
+FREE_POSITIONS, FREE_VELOCITIES = ("x", "y", "z", "qw", "qx", "qy", "qz"), ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 def mjcf() -> str:
-    """The model's source."""
+    """The MJCF source of the model."""
     return files("dextron_bench.world").joinpath("hand.xml").read_text(encoding="utf-8")
 
 
 def mjcf_hash() -> str:
-    """SHA-256 of the model's source, hexadecimal."""
+    """SHA-256 of the MJCF source, hexadecimal."""
     return hashlib.sha256(mjcf().encode()).hexdigest()
 
 
 @cache
 def load() -> mujoco.MjModel:
-    """The compiled model, shared; treat it as read-only."""
+    """The compiled model. All callers share it and must not change it."""
     return mujoco.MjModel.from_xml_string(mjcf())
 
 
@@ -49,21 +49,21 @@ def substeps() -> int:
 
 @cache
 def proximal() -> tuple[np.ndarray, np.ndarray]:
-    """Indices in qpos of the five proximal joints (thumb first), and their angles [rad] when closed."""
+    """Indices in qpos of the five proximal joints, thumb first, and their angles [rad] when closed; each (5,)."""
     joints = [load().joint(f"{digit}_proximal") for digit in DIGITS]
     closed = [joint.range[np.argmax(np.abs(joint.range))] for joint in joints]
-    return _frozen(np.array([joint.qposadr[0] for joint in joints])), _frozen(np.array(closed))
+    return _read_only(np.array([joint.qposadr[0] for joint in joints])), _read_only(np.array(closed))
 
 
 @cache
 def command_gain() -> np.ndarray:
     """Velocity command of each digit [rad/s] for an action of 1, shape (5,), thumb first."""
-    return _frozen(np.abs(proximal()[1]) / REFERENCE_RANGE)
+    return _read_only(np.abs(proximal()[1]) / REFERENCE_RANGE)
 
 
 @cache
 def half_closed() -> np.ndarray:
-    """Joint positions (25,) at the start of an episode, the palm's pose still to be set."""
+    """Joint positions (25,) at the start of an episode, without the palm's pose, which the caller sets."""
     model = load()
     qpos = model.qpos0.copy()
     for digit in DIGITS:
@@ -72,25 +72,25 @@ def half_closed() -> np.ndarray:
         qpos[model.joint(f"{digit}_proximal").qposadr] = close
         qpos[model.joint(f"{digit}_distal").qposadr] = close * coupling
     qpos[model.joint("thumb_base").qposadr] = THUMB_OPPOSED
-    return _frozen(qpos)
+    return _read_only(qpos)
 
 
 @cache
 def state_names() -> tuple[str, ...]:
-    """Names of the numbers in a state, (48,): where things are, then how fast they move.
+    """Names of the 48 numbers in a state: positions, then velocities.
 
-    Positions are in [m], quaternions wxyz, angles in [rad]. Free bodies' velocities `vx` to `vz` are the world's [m/s],
-    `wx` to `wz` those about the body's own axes [rad/s].
+    Positions are in [m], quaternions are wxyz, and angles are in [rad]. For free bodies, `vx` to `vz` are velocities in
+    the world frame [m/s], and `wx` to `wz` are angular velocities about the axes of the body [rad/s].
     """
-    places, speeds = [], []
-    for joint in map(load().joint, range(load().njnt)):  # In the order of their addresses.
+    positions, velocities = [], []
+    for joint in map(load().joint, range(load().njnt)):  # In the order of qpos.
         free = joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
-        places += [f"{joint.name}_{axis}" for axis in FREE_PLACE] if free else [joint.name]
-        speeds += [f"{joint.name}_{axis}" for axis in FREE_SPEED] if free else [f"{joint.name}_velocity"]
-    return (*places, *speeds)
+        positions += [f"{joint.name}_{axis}" for axis in FREE_POSITIONS] if free else [joint.name]
+        velocities += [f"{joint.name}_{axis}" for axis in FREE_VELOCITIES] if free else [f"{joint.name}_velocity"]
+    return (*positions, *velocities)
 
 
-def _frozen(array: np.ndarray) -> np.ndarray:
-    """The array, which nobody can change from now on, since all share it."""
+def _read_only(array: np.ndarray) -> np.ndarray:
+    """Makes the array read-only, since all callers share it, and returns it."""
     array.flags.writeable = False
     return array

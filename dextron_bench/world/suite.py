@@ -23,9 +23,9 @@ def load(
     settings: Sequence[Setting] | None = None,
     seed: int | np.random.Generator | None = None,
 ) -> control.Environment:
-    """An environment that plays `settings` over and over, or draws from a source of reaches.
+    """An environment that plays `settings` in turn, again and again, or draws settings from a source of reaches.
 
-    Takes the source or its name. Raises UnknownSource, MissingData, ActionError.
+    Takes the source or its name. Raises UnknownSource and MissingData; steps raise ActionError.
     """
     grasp = Grasp(SettingQueue(reaches, settings), np.random.default_rng(seed))
     return control.Environment(Physics.load(), grasp, n_sub_steps=model.substeps(), legacy_step=False)
@@ -36,11 +36,11 @@ class Physics(dm_mujoco.Physics):
 
     @classmethod
     def load(cls) -> Physics:
-        """A simulation of its own copy of the model."""
+        """A simulation with a copy of the model."""
         return cls.from_model(wrapper.MjModel(copy.copy(model.load())))
 
     def after_reset(self) -> None:
-        """Computes what follows from the state, and forgets the solver's result, from which a step would start."""
+        """Computes derived quantities, and clears the solver's last result, which would influence the next step."""
         super().after_reset()
         self.data.qacc_warmstart[:] = 0.0
 
@@ -48,15 +48,15 @@ class Physics(dm_mujoco.Physics):
         """A copy of the state, shape (1, 48)."""
         return np.concatenate([self.data.qpos, self.data.qvel])[None]
 
-    def carry(self, path: Path, step: int) -> None:
-        """Puts the palm's carrier at a path's pose of that control step, or at its last."""
+    def move_carrier(self, path: Path, step: int) -> None:
+        """Moves the palm's carrier to the pose of a path at a control step, or to its last pose."""
         pose = min(step, len(path) - 1)
         self.data.mocap_pos[0] = path.positions[pose]
         self.data.mocap_quat[0] = path.quaternions[pose]
 
 
 class Grasp(control.Task):
-    """Close the hand in time to lift the bottle. `setting` is the one being played."""
+    """Close the hand in time to lift the bottle. `setting` is the setting of the present episode."""
 
     setting: Setting
 
@@ -66,10 +66,10 @@ class Grasp(control.Task):
         self._outcome = (0.0, False, False)
 
     def initialize_episode(self, physics: Physics) -> None:
-        """Deals a setting; half closes the hand and puts it at the start of the reach."""
+        """Takes the next setting, half closes the hand, and puts it at the start of the reach."""
         self.setting = self._settings.next(self._rng)
         self._path = self._settings.source.path(self.setting)
-        physics.carry(self._path, 0)
+        physics.move_carrier(self._path, 0)
         qpos = model.half_closed().copy()
         qpos[model.PALM_POSITION] = self._path.positions[0] + PALM_AHEAD
         qpos[model.PALM_QUATERNION] = self._path.quaternions[0]
@@ -77,12 +77,12 @@ class Grasp(control.Task):
         self._progress.begin(np.array([0]), physics.states(), np.array([len(self._path)]))
 
     def before_step(self, action: np.ndarray, physics: Physics) -> None:
-        """Commands the fingers and moves the hand on; raises ActionError."""
+        """Commands the fingers and moves the hand along its path. Raises ActionError."""
         physics.set_control(task.commands(validated_action(action, (1,))[None])[0])
-        physics.carry(self._path, int(self._progress.step[0]) + 1)
+        physics.move_carrier(self._path, int(self._progress.step[0]) + 1)
 
     def after_step(self, physics: Physics) -> None:
-        """Works out the reward and whether the episode is over."""
+        """Computes the reward and the end of the episode."""
         reward, terminated, truncated = self._progress.advance(np.array([0]), physics.states())
         self._outcome = (float(reward[0]), bool(terminated[0]), bool(truncated[0]))
 
@@ -91,11 +91,11 @@ class Grasp(control.Task):
         return OrderedDict(state=physics.states()[0])
 
     def get_reward(self, physics: Physics) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """1 for a step of the countdown with the bottle lifted, else 0."""
+        """1 for a step of the countdown with the bottle lifted, otherwise 0."""
         return self._outcome[0]
 
     def get_termination(self, physics: Physics) -> float | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Discount of the last step: 0 where the bottle fell, 1 where time was up; None while the episode lasts."""
+        """Discount of the last step: 0 if the bottle fell, 1 if the episode was truncated; None during the episode."""
         _, terminated, truncated = self._outcome
         return 0.0 if terminated else 1.0 if truncated else None
 
@@ -104,5 +104,5 @@ class Grasp(control.Task):
         return specs.BoundedArray((1,), np.float64, -1.0, 1.0, name="action")
 
     def observation_spec(self, physics: Physics) -> OrderedDict[str, specs.Array]:
-        """What `get_observation` returns."""
+        """The form of what `get_observation` returns."""
         return OrderedDict(state=specs.Array((model.STATE,), np.float64, name="state"))

@@ -1,6 +1,6 @@
-"""The task: what is observed, commanded, rewarded, and when an episode ends. Pure functions on arrays.
+"""The task as pure functions on arrays: measurements, commands, rewards, and the ends of episodes.
 
-States are (N, 48): bottle pose, palm pose, 11 finger angles, then their velocities (paper, II.A).
+States have shape (N, 48): bottle pose, palm pose and 11 finger angles, then their velocities (paper, II.A).
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from dextron_bench.world import model
 
 STEP_LIMIT = 500  # Control steps in an episode: 10 s.
 LIFTED = 0.25  # [m] height of the bottle's centre from which a step is rewarded.
-FALLEN = 0.110  # [m] height of the bottle's centre below which it has fallen over.
+FALLEN = 0.110  # [m] height of the bottle's centre below which the bottle counts as fallen.
 HAND_RAISED = 0.145  # [m] rise of the hand above its start that starts the countdown.
-COUNTDOWN = 20  # Control steps that are rewarded once the bottle or the hand is up.
-HOLD = 20  # Control steps that the last pose of a reach is held.
+COUNTDOWN = 20  # Control steps that can earn a reward, after the bottle or the hand has risen.
+HOLD = 20  # Control steps for which the hand holds the last pose of a reach.
 SUCCESS = 20.0  # Sum of rewards of a successful grasp.
 
 
 def palm_centre(states: np.ndarray) -> np.ndarray:
-    """Palm centre in the world frame [m], shape (N, 3)."""
+    """Palm centres in the world frame [m], shape (N, 3)."""
     palm = states[:, model.PALM_POSITION]
     return palm + rotation.rotate(states[:, model.PALM_QUATERNION], PALM_CENTRE)
 
 
 def distance(states: np.ndarray) -> np.ndarray:
-    """Horizontal distance from palm centre to the bottle's axis [m], shape (N,)."""
-    apart = palm_centre(states)[:, :2] - states[:, model.BOTTLE_POSITION][:, :2]
-    return np.sqrt((apart * apart).sum(axis=1))
+    """Horizontal distance from the palm centre to the bottle's axis [m], shape (N,)."""
+    offset = palm_centre(states)[:, :2] - states[:, model.BOTTLE_POSITION][:, :2]
+    return np.sqrt((offset * offset).sum(axis=1))
 
 
 def closure(states: np.ndarray) -> np.ndarray:
-    """How far the most closed digit is closed, 0 open to 1 closed, shape (N,)."""
+    """Closure of the most closed digit, from 0 (open) to 1 (closed), shape (N,)."""
     joints, closed = model.proximal()
     return (states[:, joints] / closed).max(axis=1)
 
@@ -51,27 +51,28 @@ def hand_height(states: np.ndarray) -> np.ndarray:
 
 
 def is_lifted(states: np.ndarray) -> np.ndarray:
-    """True where the bottle counts as lifted, shape (N,)."""
+    """True if the bottle counts as lifted, shape (N,)."""
     return bottle_height(states) >= LIFTED
 
 
 def has_fallen(states: np.ndarray) -> np.ndarray:
-    """True where the bottle fell over, shape (N,)."""
+    """True if the bottle has fallen, shape (N,)."""
     return bottle_height(states) < FALLEN
 
 
 def commands(actions: np.ndarray) -> np.ndarray:
-    """Actuator controls (N, 6) for actions (N, 1): the thumb's base held, every digit's velocity [rad/s]."""
+    """Actuator controls (N, 6) for actions (N, 1): angle of the thumb's base [rad], velocity of every digit [rad/s]."""
     opposed = np.full_like(actions, model.THUMB_OPPOSED)
     return np.concatenate([opposed, actions * model.command_gain()], axis=1)
 
 
 @dataclass(slots=True)
 class Progress:
-    """What ending and reward depend on beside the state, one entry an episode, each (N,).
+    """Progress of N episodes, on which rewards and ends depend in addition to the states; each array (N,).
 
-    `left` counts the steps still rewarded, -1 before the countdown; `last` is the step at which the
-    reach has been held long enough; `raised` [m] is the hand's height that starts the countdown.
+    `step` counts control steps. `left` is the number of countdown steps that remain, -1 before the countdown. `last` is
+    the step at which the end of the reach has been held for HOLD steps. `raised` [m] is the height of the hand that
+    starts the countdown.
     """
 
     step: np.ndarray
@@ -85,22 +86,22 @@ class Progress:
         return cls(np.zeros(n, int), np.full(n, -1), np.zeros(n, int), np.zeros(n))
 
     def begin(self, ids: np.ndarray, states: np.ndarray, path_lengths: np.ndarray) -> None:
-        """Starts episodes `ids` in states (n, 48) along paths of so many poses (n,)."""
+        """Begins episodes `ids` (n,) in states (n, 48), along paths with these numbers of poses (n,)."""
         self.step[ids] = 0
         self.left[ids] = -1
         self.last[ids] = np.minimum(path_lengths - 1 + HOLD, STEP_LIMIT)
         self.raised[ids] = hand_height(states) + HAND_RAISED
 
     def copy(self, source: np.ndarray, target: np.ndarray) -> None:
-        """Makes episodes `target` (n,) stand where episodes `source` (n,) do."""
+        """Copies the progress of episodes `source` (n,) to episodes `target` (n,)."""
         for entries in (self.step, self.left, self.last, self.raised):
             entries[target] = entries[source]
 
     def advance(self, ids: np.ndarray, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Reward, terminated and truncated, each (n,), of the step by which episodes `ids` came to states (n, 48).
+        """Reward, terminated and truncated, each (n,), of the step that took episodes `ids` to states (n, 48).
 
-        The first step with the bottle lifted or the hand raised starts the countdown; each of the
-        COUNTDOWN steps after it earns 1 with the bottle lifted, and the last of them ends the episode.
+        The first step with the bottle lifted or the hand raised starts the countdown and earns nothing. Each of the
+        COUNTDOWN steps after it earns 1 if the bottle is lifted. The last of them ends the episode.
         """
         step = self.step[ids] + 1
         left = self.left[ids]

@@ -1,4 +1,4 @@
-"""How the world looks: pictures of states, rendered off screen."""
+"""Renders pictures of states off screen."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ import numpy as np
 
 from dextron_bench.world.rendering import visuals
 
-LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # Ways to draw without a screen, best first, and what each needs.
+LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # The library of each off-screen backend, best first.
 INSTALL = (
     "install EGL (Debian: apt install libegl1 libgl1-mesa-dri) or OSMesa (apt install libosmesa6), "
     "and set MUJOCO_GL to egl or osmesa"
 )
-SUPERSAMPLING = 2  # Pixels of stills are rendered this many times smaller than they come out.
-LIGHT_RADIUS = 0.35  # [m] of the lamp that throws soft shadows.
+SUPERSAMPLING = 2  # Rendered pixels along each side of a pixel of the picture.
+LIGHT_RADIUS = 0.35  # [m] radius of the lamp that casts soft shadows.
 
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Looks at a point [m] from a distance [m]; azimuth and elevation in degrees, as in MuJoCo."""
+    """A camera that looks at a target point [m] from a distance [m]; azimuth and elevation in degrees, as in MuJoCo."""
 
     azimuth: float
     elevation: float
@@ -45,11 +45,11 @@ CAMERAS = {
 
 
 class NoGraphics(RuntimeError):
-    """No way to draw off screen."""
+    """Off-screen rendering is not possible; the message says what to install."""
 
 
 class UnknownCamera(KeyError):
-    """A camera that there is not."""
+    """No camera has that name; the message lists the names."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"no camera {name!r}; choose from {', '.join(sorted(CAMERAS))}")
@@ -59,7 +59,7 @@ class UnknownCamera(KeyError):
 
 
 def render(state: np.ndarray, width: int = 640, height: int = 480, camera: str = "side", lights: int = 1) -> np.ndarray:
-    """One picture, RGB (height, width, 3) uint8, of a state (48,). More `lights` make shadows softer.
+    """A picture, RGB (height, width, 3) uint8, of a state (48,). More `lights` make shadows softer.
 
     Raises NoGraphics and UnknownCamera.
     """
@@ -69,30 +69,30 @@ def render(state: np.ndarray, width: int = 640, height: int = 480, camera: str =
 def frames(
     states: np.ndarray, width: int = 640, height: int = 480, camera: str = "side", lights: int = 1
 ) -> np.ndarray:
-    """Pictures (T, height, width, 3) uint8 of states (T, 48); raises as `render`."""
+    """Pictures (T, height, width, 3) uint8 of states (T, 48). Raises the errors of `render`."""
     if camera not in CAMERAS:
         raise UnknownCamera(camera)
-    with Painter(width, height) as painter:
-        return np.stack([painter.paint(state, CAMERAS[camera], lights) for state in states])
+    with Renderer(width, height) as renderer:
+        return np.stack([renderer.render(state, CAMERAS[camera], lights) for state in states])
 
 
-class Painter:
-    """An off-screen picture of fixed size, to be painted again and again; free it with `with`."""
+class Renderer:
+    """Renders pictures of one size off screen. Use it in a `with` statement, which frees its memory at the end."""
 
     def __init__(self, width: int, height: int, supersampling: int = SUPERSAMPLING) -> None:
-        """Takes the size of pictures [pixels] and how many times finer they are rendered; raises NoGraphics."""
-        self._finer = supersampling
+        """Takes the size of the pictures [pixels] and the supersampling along each side. Raises NoGraphics."""
+        self._supersampling = supersampling
         self._size = width, height = width * supersampling, height * supersampling
         self._model = visuals.visual_model()
         self._data = mujoco.MjData(self._model)
-        with warnings.catch_warnings(action="ignore"):  # GLFW says by them what the errors below do.
-            self._context = context(width, height)
+        with warnings.catch_warnings(action="ignore"):  # GLFW warns of the errors that are raised below.
+            self._context = create_context(width, height)
             self._context.make_current()
         try:
             self._graphics = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         except mujoco.FatalError as error:
             raise NoGraphics(f"cannot draw off screen: {error}; {INSTALL}") from error
-        mujoco.mjr_resizeOffscreen(width, height, self._graphics)  # A larger one costs time in every picture.
+        mujoco.mjr_resizeOffscreen(width, height, self._graphics)  # A larger buffer costs time in every picture.
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._graphics)
         self._scene = mujoco.MjvScene(self._model, maxgeom=1000)
         self._option = mujoco.MjvOption()
@@ -104,28 +104,28 @@ class Painter:
         self._graphics.free()
         self._context.free()
 
-    def paint(self, state: np.ndarray, camera: Camera, lights: int = 1) -> np.ndarray:
-        """A picture, averaged over so many places of the key light."""
+    def render(self, state: np.ndarray, camera: Camera, lights: int = 1) -> np.ndarray:
+        """A picture (height, width, 3) uint8 of a state (48,), averaged over `lights` positions of the key light."""
         self._data.qpos[:] = state[: self._model.nq]
         mujoco.mj_forward(self._model, self._data)
         key = self._model.light("key").id
-        home = self._data.light_xpos[key].copy()
+        centre = self._data.light_xpos[key].copy()
         total = np.zeros((self._size[1], self._size[0], 3))
         for shift in _disc(lights, LIGHT_RADIUS):
-            self._data.light_xpos[key] = home + shift
-            total += self._shot(camera)
+            self._data.light_xpos[key] = centre + shift
+            total += self._render_once(camera)
         picture = total / lights
-        n = self._finer
+        n = self._supersampling
         rows = picture[::-1].reshape(self._size[1] // n, n, self._size[0] // n, n, 3)
         return np.round(rows.mean(axis=(1, 3))).astype(np.uint8)
 
-    def _shot(self, camera: Camera) -> np.ndarray:
-        """One rendered picture, bottom row first."""
+    def _render_once(self, camera: Camera) -> np.ndarray:
+        """One picture at the rendered size, bottom row first."""
         view = mujoco.MjvCamera()
         view.azimuth, view.elevation, view.distance = camera.azimuth, camera.elevation, camera.distance
         view.lookat[:] = camera.target
-        everything = mujoco.mjtCatBit.mjCAT_ALL.value
-        mujoco.mjv_updateScene(self._model, self._data, self._option, None, view, everything, self._scene)
+        categories = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(self._model, self._data, self._option, None, view, categories, self._scene)
         viewport = mujoco.MjrRect(0, 0, *self._size)
         mujoco.mjr_render(viewport, self._scene, self._graphics)
         pixels = np.empty((self._size[1], self._size[0], 3), np.uint8)
@@ -134,7 +134,7 @@ class Painter:
 
 
 def _disc(n: int, radius: float) -> np.ndarray:
-    """Points (n, 3) spread evenly over a level disc; the centre alone for n = 1."""
+    """Points (n, 3) that cover a horizontal disc evenly; only the centre if n is 1."""
     i = np.arange(n)
     r, turn = radius * np.sqrt(i / n), i * np.pi * (3 - np.sqrt(5))
     return np.stack([r * np.cos(turn), r * np.sin(turn), np.zeros(n)], axis=1)
@@ -147,16 +147,16 @@ class Context(Protocol):
     def free(self) -> None: ...
 
 
-def context(width: int, height: int) -> Context:
-    """An OpenGL context: of the kind that MUJOCO_GL names, else the first that there is a library for.
+def create_context(width: int, height: int) -> Context:
+    """Creates an OpenGL context with the backend that MUJOCO_GL names, or the first with an installed library.
 
     Raises NoGraphics.
     """
-    kind = os.environ.get("MUJOCO_GL", "").lower().strip()
-    kind = kind or next((name for name, library in LIBRARIES.items() if find_library(library)), "")
-    if kind not in (*LIBRARIES, "glfw"):
-        raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={kind!r}: {INSTALL}")
+    backend = os.environ.get("MUJOCO_GL", "").lower().strip()
+    backend = backend or next((name for name, library in LIBRARIES.items() if find_library(library)), "")
+    if backend not in (*LIBRARIES, "glfw"):
+        raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={backend!r}: {INSTALL}")
     try:
-        return import_module(f"mujoco.{kind}").GLContext(width, height)
-    except Exception as error:  # Each library fails in its own way.
-        raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={kind}: {error}; {INSTALL}") from error
+        return import_module(f"mujoco.{backend}").GLContext(width, height)
+    except Exception as error:  # Each library has its own errors.
+        raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={backend}: {error}; {INSTALL}") from error
