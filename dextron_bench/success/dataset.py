@@ -1,71 +1,77 @@
-"""Reading the data set in batches, straight from the disk: memory grows with its episodes, not with its transitions."""
+"""Reads the training data of the success model in batches from the disk.
+
+The arrays stay on the disk, so memory grows with the number of episodes and not with the number of transitions.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from dextron_bench.storage import tensors
+from dextron_bench.storage import atomic, tensors
 from dextron_bench.world import model
 
-REMEDY = "remove it, and the same `dextron-bench success data` plays it again"
-TEST_EVERY = 5  # Every so many episodes of a block one is for testing: 80 % and 20 %, by episode (paper, II.E).
+CONFIG = "search.json"  # In the folder of a data set: its config (under "search") and the hash of the physics.
+REMEDY = "remove it, and run the same `dextron-bench success data` again"
+TEST_EVERY = 5  # One episode in five of each block is for testing: 80 % and 20 % of the episodes (paper, II.E).
 
 
 class EmptyDataset(LookupError):
-    """A folder that holds no blocks."""
+    """The folder holds no blocks."""
 
 
 class BadDataset(ValueError):
-    """Blocks that are no data set to learn from."""
+    """The blocks of a folder cannot be used for training."""
 
 
 class Dataset:
-    """The transitions of four in five of the episodes in a folder, or of the others; numbered from 0."""
+    """The transitions of the training episodes in a folder (four in five), or of its test episodes, counted from 0."""
 
     def __init__(self, folder: Path, test: bool = False) -> None:
-        """Takes the episodes to learn from, or those for testing; raises EmptyDataset, BadDataset."""
+        """Opens the training episodes, or with `test` the test episodes. Raises EmptyDataset, BadDataset."""
         files = sorted((folder / "blocks").glob("[0-9]*.safetensors"))
         if not files:
             raise EmptyDataset(f"{folder} holds no data set; make one with `dextron-bench success data`")
-        if lost := [number for number, file in enumerate(files) if int(file.stem) != number]:
-            raise BadDataset(
-                f"{folder} lacks block {lost[0]:06d}; the same `dextron-bench success data` plays it again"
-            )
+        if gaps := [number for number, file in enumerate(files) if int(file.stem) != number]:
+            raise BadDataset(f"{folder} lacks block {gaps[0]:06d}; run the same `dextron-bench success data` again")
         self._files, self._blocks = files, [open_block(file) for file in files]
-        if len(np.unique(np.concatenate([each["solved"] for each in self._blocks]))) < 2:
+        if len(np.unique(np.concatenate([block["solved"] for block in self._blocks]))) < 2:
             raise BadDataset(
-                f"all episodes in {folder} end alike, which teaches nothing; `success data` with more --rows"
+                f"all episodes in {folder} have the same outcome, so there is nothing to learn from them; "
+                "run `dextron-bench success data` with more --rows"
             )
-        chosen = [np.arange(len(block["solved"])) % TEST_EVERY == TEST_EVERY - 1 for block in self._blocks]
-        chosen = [held == test for held in chosen]
-        pairs = list(zip(self._blocks, chosen, strict=True))
-        self._of = np.repeat(np.arange(len(files)), [mine.sum() for mine in chosen])
-        self._begins = np.concatenate([block["starts"][:-1][mine] for block, mine in pairs])
-        self._solved = np.concatenate([block["solved"][mine] for block, mine in pairs])
-        self._ends = np.cumsum(np.concatenate([np.diff(block["starts"])[mine] for block, mine in pairs]))
+        is_test = [np.arange(len(block["solved"])) % TEST_EVERY == TEST_EVERY - 1 for block in self._blocks]
+        pairs = [(block, mask == test) for block, mask in zip(self._blocks, is_test, strict=True)]
+        self._block_numbers = np.repeat(np.arange(len(files)), [mask.sum() for _, mask in pairs])
+        self._first_rows = np.concatenate([block["starts"][:-1][mask] for block, mask in pairs])
+        self._solved = np.concatenate([block["solved"][mask] for block, mask in pairs])
+        self._ends = np.cumsum(np.concatenate([np.diff(block["starts"])[mask] for block, mask in pairs]))
 
     def __len__(self) -> int:
         return int(self._ends[-1])
 
-    def take(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """States (B, 48), actions (B,), float32, and outcomes (B,), 1 for success, of transitions `places` (B,)."""
-        episodes = np.searchsorted(self._ends, places, side="right")
-        firsts = np.append(0, self._ends)[episodes]
-        rows, of = self._begins[episodes] + places - firsts, self._of[episodes]
-        states, actions = np.empty((len(places), model.STATE), np.float32), np.empty(len(places), np.float32)
-        for number in np.unique(of):
-            mine = of == number
-            states[mine] = self._blocks[number]["states"][rows[mine]]
-            actions[mine] = self._blocks[number]["actions"][rows[mine]]
-        if (wrong := ~(np.isfinite(states).all(axis=1) & np.isfinite(actions))).any():
-            raise _damaged(self._files[of[wrong][0]], "holds numbers that are not finite")
+    def take(self, transitions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States (B, 48) and actions (B,) as float32, and outcomes (B,), 1 for success, of transitions (B,).
+
+        Raises BadDataset if a state or an action is not finite.
+        """
+        episodes = np.searchsorted(self._ends, transitions, side="right")
+        steps = transitions - np.append(0, self._ends)[episodes]
+        rows, numbers = self._first_rows[episodes] + steps, self._block_numbers[episodes]
+        states, actions = np.empty((len(rows), model.STATE), np.float32), np.empty(len(rows), np.float32)
+        for number in np.unique(numbers):
+            in_block = numbers == number
+            states[in_block] = self._blocks[number]["states"][rows[in_block]]
+            actions[in_block] = self._blocks[number]["actions"][rows[in_block]]
+        if (bad := ~(np.isfinite(states).all(axis=1) & np.isfinite(actions))).any():
+            raise _damaged(self._files[numbers[bad][0]], "holds numbers that are not finite")
         return states, actions, self._solved[episodes].astype(np.int64)
 
 
 def open_block(file: Path) -> dict[str, np.ndarray]:
-    """The arrays of a block, left on the disk: `states` (R, 48), `actions` (R,), `starts` (E + 1,) and `solved` (E,).
+    """Arrays of a block, mapped from the disk: `states` (R, 48), `actions` (R,), `starts` (E + 1,), `solved` (E,).
 
     Raises BadDataset, OSError.
     """
@@ -73,8 +79,8 @@ def open_block(file: Path) -> dict[str, np.ndarray]:
         arrays = tensors.mapped(file)
         rows, episodes = len(arrays["actions"]), len(arrays["solved"])
         shapes = {"states": (rows, model.STATE), "actions": (rows,), "starts": (episodes + 1,), "solved": (episodes,)}
-        if other := [name for name, shape in shapes.items() if arrays[name].shape != shape]:
-            raise _damaged(file, f"has {other[0]!r} of another length")
+        if wrong := [name for name, shape in shapes.items() if arrays[name].shape != shape]:
+            raise _damaged(file, f"has an array {wrong[0]!r} of the wrong shape {arrays[wrong[0]].shape}")
     except tensors.BadTensors as error:
         raise BadDataset(f"{error}; {REMEDY}") from error
     except KeyError as error:
@@ -82,5 +88,14 @@ def open_block(file: Path) -> dict[str, np.ndarray]:
     return arrays
 
 
-def _damaged(file: Path, what: str) -> BadDataset:
-    return BadDataset(f"{file} {what}; {REMEDY}")
+def read_config(folder: Path) -> dict[str, Any]:
+    """Config of the data set in a folder, and hash of its physics; empty if the folder has no config.
+
+    Raises DamagedFile.
+    """
+    file = folder / CONFIG
+    return atomic.read_json(file) if file.exists() else {}
+
+
+def _damaged(file: Path, fault: str) -> BadDataset:
+    return BadDataset(f"{file} {fault}; {REMEDY}")

@@ -1,4 +1,4 @@
-"""What the success model thinks while an episode runs, and the five kinds of episodes that the paper shows (Fig. 5)."""
+"""Finds episodes that show how the success model works: the five kinds of episodes in the paper's Fig. 5."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.success.predict import predict
-from dextron_bench.world import model as world_model
+from dextron_bench.world.model import CONTROL_STEP
 
 KINDS = {
     "fading": "hope that fades by wrong actions",
@@ -25,15 +25,16 @@ KINDS = {
     "policy": "right for a policy",
     "wrong": "the model is wrong",
 }
-EXPERT = "expert"  # Who acts where it is no policy.
-OPEN = 0.6  # A window of hope is open where the best action has this chance at least.
-RIGHT = 0.5  # A model that is right at fewer of the steps was wrong about the episode.
-SHUT = 0.2  # It is shut where even the best has this chance at most.
+EXPERT = "expert"  # The player of an episode that no policy plays.
+POSSIBLE = 0.6  # Success was possible in an episode if the best action had at least this chance at some step.
+LOST = 0.2  # Success is no longer possible if even the best action has at most this chance.
+RIGHT = 0.5  # The model is wrong about an episode if its accuracy is below this.
+FALL_TIME = 0.25  # [s] in which the predicted chance falls when a hand closes too early.
 
 
 @dataclass(frozen=True, slots=True)
 class PredictedEpisode:
-    """An episode as the model foretells it; `player` says who acts, "expert" or a policy's name."""
+    """An episode with the model's predictions; `player` is "expert" or the name of the policy that plays it."""
 
     player: str
     episode: Episode
@@ -42,59 +43,60 @@ class PredictedEpisode:
 
     @property
     def times(self) -> np.ndarray:
-        """When each step (T,) is, as a share of the reach's duration."""
+        """Time of each step (T,), as a share of the reach's duration."""
         return np.arange(len(self.predictions.chances)) / self.predictions.duration
 
     @property
     def correct(self) -> np.ndarray:
-        """True for the steps (T,) at which the outcome is foretold."""
+        """True for the steps (T,) at which the model predicts the outcome correctly."""
         return (self.predictions.chances > 0.5) == self.episode.success
 
     @property
     def accuracy(self) -> float:
-        """The share of steps at which the outcome is foretold."""
+        """Share of the steps at which the model predicts the outcome correctly."""
         return float(self.correct.mean())
 
 
 def predict_episode(model: SuccessModel, source: Source, case: Case, player: str, episode: Episode) -> PredictedEpisode:
-    """What the model thinks at each step of an episode of a case."""
+    """An episode of a case, with its diagnosis and the model's predictions for each step."""
     return PredictedEpisode(player, episode, diagnose(episode, case), predict(model, source, case, episode))
 
 
 def play_and_predict(
     model: SuccessModel, source: Source, cases: Sequence[Case], policies: Mapping[str, Agent], threads: int = 0
 ) -> Iterator[PredictedEpisode]:
-    """Episodes of experts and of named policies on the same cases, as the model foretells them."""
+    """Plays experts and then each named policy on the same cases, and predicts every episode."""
     for player, agent in {EXPERT: ExpertAgent(), **policies}.items():
-        played = dict(rollout(agent, source, cases, threads=threads))
+        episodes = dict(rollout(agent, source, cases, threads=threads))
         for row, case in enumerate(cases):
-            yield predict_episode(model, source, case, player, played[row])
+            yield predict_episode(model, source, case, player, episodes[row])
 
 
-def choose(seen: Iterable[PredictedEpisode]) -> dict[str, PredictedEpisode]:
-    """The clearest episode of each of KINDS, those left out of which there is none."""
+def choose(episodes: Iterable[PredictedEpisode]) -> dict[str, PredictedEpisode]:
+    """The clearest episode of each kind, in the order of KINDS; kinds without an episode are left out."""
     best: dict[str, tuple[float, PredictedEpisode]] = {}
-    for each in seen:
-        for kind, score in _scores(each).items():
+    for episode in episodes:
+        for kind, score in _clearness(episode).items():
             if kind not in best or score > best[kind][0]:
-                best[kind] = score, each
+                best[kind] = score, episode
     return {kind: best[kind][1] for kind in KINDS if kind in best}
 
 
-def _scores(seen: PredictedEpisode) -> dict[str, float]:
-    """How clear an episode is as the kind that it is, if it is any."""
-    own, curves, chances = seen.player != EXPERT, seen.predictions.curves, seen.predictions.chances
-    if own and not seen.episode.success:  # What experts do wrong explains no policy.
-        if seen.diagnosis.cause == "too early":
-            return {"early": _fall(chances)}
-        if (curves.max(axis=1) >= OPEN).any() and curves[-1].max() <= SHUT:
-            return {"fading": seen.accuracy * float((curves.max(axis=1) - chances).mean())}
-    if seen.accuracy < RIGHT:
-        return {"wrong": 1.0 - seen.accuracy}
-    return {"policy" if own else "expert": seen.accuracy} if seen.episode.success else {}
+def _clearness(predicted: PredictedEpisode) -> dict[str, float]:
+    """How clearly an episode shows its kind; empty if it is of no kind."""
+    curves, chances = predicted.predictions.curves, predicted.predictions.chances
+    is_policy, success = predicted.player != EXPERT, predicted.episode.success
+    if is_policy and not success:  # An expert's mistake does not explain a policy.
+        if predicted.diagnosis.cause == "too early":
+            return {"early": _largest_fall(chances)}
+        if (curves.max(axis=1) >= POSSIBLE).any() and curves[-1].max() <= LOST:
+            return {"fading": predicted.accuracy * float((curves.max(axis=1) - chances).mean())}
+    if predicted.accuracy < RIGHT:
+        return {"wrong": 1.0 - predicted.accuracy}
+    return {"policy" if is_policy else "expert": predicted.accuracy} if success else {}
 
 
-def _fall(chances: np.ndarray) -> float:
-    """The largest drop of chances (T,) within a quarter of a second."""
-    lag = min(int(0.25 / world_model.CONTROL_STEP), len(chances) - 1)
+def _largest_fall(chances: np.ndarray) -> float:
+    """The largest fall of chances (T,) within FALL_TIME."""
+    lag = min(int(FALL_TIME / CONTROL_STEP), len(chances) - 1)
     return float((chances[:-lag] - chances[lag:]).max()) if lag else 0.0

@@ -15,83 +15,86 @@ from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 
 HIDDEN = 256
-SIZES = ((HIDDEN, model.STATE + 1), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (2, HIDDEN), (2,))  # Of its layers.
-GRID = np.linspace(-1.0, 1.0, 51)  # The actions of a curve (paper, fig. 5).
-CLIP = 10.0  # Scaled states are clipped to this far from 0.
+SIZES = ((HIDDEN, model.STATE + 1), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (2, HIDDEN), (2,))  # Of weights and biases.
+GRID = np.linspace(-1.0, 1.0, 51)  # The actions of a curve (paper, Fig. 5).
+CLIP = 10.0  # Scaled states are clipped to [-CLIP, CLIP].
 
 
 class BadModel(ValueError):
-    """Arrays that make no success model."""
+    """The arrays are not those of a success model."""
 
 
 class MissingModel(LookupError):
-    """A source of reaches for which no success model ships."""
+    """No success model ships for the source of reaches."""
 
 
 class SuccessModel:
-    """A perceptron of three layers and two classes on scaled states; its chances are the same at any batch size."""
+    """A perceptron with three layers and two classes on scaled states. Its chances do not depend on the batch size."""
 
     def __init__(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Takes `mean` and `deviation` (48,) of states, and weights and biases as `layer.0` to `layer.5`.
+        """Takes `mean` and `deviation` (48,) of states, and weights and biases as `layer.0` to `layer.5` (SIZES).
 
         Raises BadModel.
         """
         names = [f"layer.{i}" for i in range(len(SIZES))]
-        wanted = dict(zip(names, SIZES, strict=True)) | dict.fromkeys(("mean", "deviation"), (model.STATE,))
-        for name, shape in wanted.items():
-            if name not in arrays or np.shape(arrays[name]) != shape:
-                raise BadModel(f"these arrays are no success model: {name!r} is not of shape {shape}")
-            if not np.isfinite(arrays[name]).all():
-                raise BadModel(f"a success model with numbers in {name!r} that are not finite")
-        if not (np.asarray(arrays["deviation"]) > 0.0).all():
-            raise BadModel("a success model with a deviation of states that is not above 0")
-        if more := sorted(arrays.keys() - wanted.keys()):
-            raise BadModel(f"these arrays are no success model: they hold {more[0]!r} too; take its model.safetensors")
+        _check(arrays, dict(zip(names, SIZES, strict=True)) | dict.fromkeys(("mean", "deviation"), (model.STATE,)))
         self._mean, self._deviation = (np.asarray(arrays[name], np.float64) for name in ("mean", "deviation"))
         first, bias, *rest = (np.asarray(arrays[name], np.float64).T for name in names)
-        self._of_states, self._of_action = Perceptron([(first[:-1], bias)]), first[-1]
-        self._rest = Perceptron(list(zip(rest[::2], rest[1::2], strict=True)))
+        self._state_layer, self._action_weights = Perceptron([(first[:-1], bias)]), first[-1]
+        self._upper_layers = Perceptron(list(zip(rest[::2], rest[1::2], strict=True)))
 
     def chance(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """The predicted chance of success, (N,), of actions (N,) in states (N, 48)."""
-        return self._chances(self._seen(states) + actions[:, None] * self._of_action)
+        """The predicted chances of success (N,) of actions (N,) in states (N, 48)."""
+        return self._chances(self._hidden(states) + actions[:, None] * self._action_weights)
 
     def curve(self, states: np.ndarray) -> np.ndarray:
-        """The chances (N, 51) of the actions of GRID in states (N, 48), as `chance` gives them."""
-        hidden = self._seen(states)[:, None] + GRID[:, None] * self._of_action
+        """The chances (N, 51) of the actions of GRID in states (N, 48), bit-equal to those of `chance`."""
+        hidden = self._hidden(states)[:, None] + GRID[:, None] * self._action_weights
         return self._chances(hidden.reshape(-1, HIDDEN)).reshape(-1, len(GRID))
 
-    def _seen(self, states: np.ndarray) -> np.ndarray:
-        """What the first layer makes of states (N, 48), without an action: (N, HIDDEN)."""
-        return self._of_states(np.clip((states - self._mean) / self._deviation, -CLIP, CLIP))
+    def _hidden(self, states: np.ndarray) -> np.ndarray:
+        """The part (N, HIDDEN) of the first layer's output that depends on states (N, 48) only, not on an action."""
+        return self._state_layer(np.clip((states - self._mean) / self._deviation, -CLIP, CLIP))
 
     def _chances(self, hidden: np.ndarray) -> np.ndarray:
-        against, in_favour = self._rest(np.maximum(hidden, 0.0)).T
-        odds = np.exp(np.clip(against - in_favour, -50.0, 50.0))
+        failure, success = self._upper_layers(np.maximum(hidden, 0.0)).T
+        odds = np.exp(np.clip(failure - success, -50.0, 50.0))
         return rounded(1.0 / (1.0 + odds))
+
+
+def _check(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[int, ...]]) -> None:
+    for name, shape in shapes.items():
+        if name not in arrays or np.shape(arrays[name]) != shape:
+            raise BadModel(f"these arrays are not a success model: {name!r} does not have the shape {shape}")
+        if not np.isfinite(arrays[name]).all():
+            raise BadModel(f"a success model needs finite numbers; {name!r} holds others")
+    if not (np.asarray(arrays["deviation"]) > 0.0).all():
+        raise BadModel("a success model needs a 'deviation' above 0 for every number of a state")
+    if extra := sorted(arrays.keys() - shapes.keys()):
+        raise BadModel(f"these arrays are not a success model: they also hold {extra[0]!r}; take a model.safetensors")
 
 
 @cache
 def shipped_model(reaches: str) -> SuccessModel:
-    """The model that ships for a source of reaches; raises MissingModel."""
+    """The success model that ships for a source of reaches; raises MissingModel."""
     with as_file(_model_file(reaches)) as file:
         return SuccessModel(tensors.read(file))
 
 
 def training_info(reaches: str) -> dict[str, Any]:
-    """What the file of the model that ships says of its training: `fit`, `rows`, `curve`; raises MissingModel."""
+    """How the model that ships was trained: its `fit`, `rows`, `curve` and more; raises MissingModel."""
     with as_file(_model_file(reaches)) as file:
         return tensors.read_about(file)
 
 
 def model_digest(reaches: str) -> str:
-    """The SHA-256 of the file of the model that ships, hexadecimal; raises MissingModel."""
+    """SHA-256, hexadecimal, of the file of the model that ships for a source of reaches; raises MissingModel."""
     with as_file(_model_file(reaches)) as file:
         return hashing.sha256(file)
 
 
 def _model_file(reaches: str) -> Traversable:
-    place = files("dextron_bench") / "data" / f"success-{reaches}.safetensors"
-    if not place.is_file():
+    file = files("dextron_bench") / "data" / f"success-{reaches}.safetensors"
+    if not file.is_file():
         raise MissingModel(f"no success model ships for {reaches} reaches; `dextron-bench success train` makes one")
-    return place
+    return file

@@ -39,9 +39,7 @@ def test_a_folder_without_a_usable_data_set_is_refused(tmp_path: Path):
     write_block(tmp_path, 0, [2], [1])
     file = block_file(tmp_path, 0)
     file.write_bytes(file.read_bytes()[:-40])
-    with pytest.raises(
-        BadDataset, match=r"000000\.safetensors is damaged.*; remove it, and run .*success data"
-    ):
+    with pytest.raises(BadDataset, match=r"000000\.safetensors is damaged.*; remove it, and run .*success data"):
         Dataset(tmp_path)
     write_block(tmp_path, 0, [2], [1])
     with pytest.raises(BadDataset, match=r"all episodes .* have the same outcome.*more --rows"):

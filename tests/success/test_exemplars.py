@@ -48,7 +48,7 @@ def test_the_clearest_episode_is_chosen_and_kinds_without_an_episode_are_left_ou
 
 
 def test_an_episode_has_one_kind_at_most_and_a_mostly_correct_model_is_not_wrong():
-    early = predicted("p", "too early", [0.9] * 20, [0.9] * 15 + [0.1] * 5)  # Its accuracy is 1/4, so it would be wrong too.
+    early = predicted("p", "too early", [0.9] * 20, [0.9] * 15 + [0.1] * 5)  # With an accuracy of 1/4.
     assert choose([early]) == {"early": early}
     mostly_correct = predicted("p", "too late", [0.9] * 3, [0.9, 0.1, 0.1])
     assert choose([mostly_correct]) == {}
