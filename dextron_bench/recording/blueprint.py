@@ -1,4 +1,4 @@
-"""How a recording opens: its plots, its text card, and the arrangement of the views."""
+"""The layout of a recording in the viewer: plots, text card, and how the views are arranged."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.recording import scene, success_plots
 from dextron_bench.world import task
 
-EYE, TARGET = (0.66, -0.62, 0.40), (-0.07, -0.10, 0.20)  # [m] whence and whither the 3D view looks.
-LINES = {  # Entity of plotted lines, their names and colours.
+EYE, TARGET = (
+    (0.66, -0.62, 0.40),
+    (-0.07, -0.10, 0.20),
+)  # [m] position of the 3D view's camera, and the point in its centre.
+LINES = {  # Entities of plotted lines, with the name and colour of each line.
     "/episode/actions": {"action": (255, 150, 50)},
     "/signals/closure": {"closure": (90, 170, 255)},
     "/signals/metres": {
@@ -27,13 +30,13 @@ LINES = {  # Entity of plotted lines, their names and colours.
     "/signals/expert": {"expert's action": (120, 200, 120)},
     "/success/chance": {"predicted success": (90, 150, 230), "threshold": (140, 140, 140)},
 }
-METRES = "Palm's distance, bottle's height [m]"  # The only plot with room for a legend.
-PLOTS = {  # Title of each plot, its lines and their range.
+METRES = "Palm's distance, bottle's height [m]"  # The only plot with enough space for a legend.
+PLOTS = {  # Title of each plot, the entities of its lines, and the range of its axis.
     "Action (orange), closure (blue)": (("/episode/actions", "/signals/closure"), (-1.1, 1.1)),
     METRES: (("/signals/metres",), (0.0, 0.7)),
     "Reward": (("/episode/rewards",), (-0.1, 1.1)),
 }
-FORETOLD = {  # The same where success is foretold.
+PLOTS_WITH_PREDICTIONS = {  # The same for recordings with predictions of the success model.
     "Action (orange), expert's (green), closure (blue)": (
         ("/episode/actions", "/signals/closure", "/signals/expert"),
         (-1.1, 1.1),
@@ -41,35 +44,35 @@ FORETOLD = {  # The same where success is foretold.
     METRES: PLOTS[METRES],
     "Reward (yellow), predicted success (blue)": (("/episode/rewards", "/success/chance"), (-0.1, 1.1)),
 }
-DIGEST = 64  # Characters of a hash, of which the card shows eight.
+HASH_LENGTH = 64  # Characters of a SHA-256; the card shows the first eight.
 BACKGROUND = (33, 38, 45)
 
 
 def signals(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
-    """What is plotted beside actions and rewards, derived from states (T, 48) from step `first` on."""
+    """Plotted signals derived from states (T, 48), which start at step `first`: closure, distance and height."""
     lifted = np.full(len(states), task.LIFTED)
     metres = np.stack([task.distance(states), task.bottle_height(states), lifted], axis=1)
-    when = scene.timelines(first, first + len(states) - 1)
-    yield Chunk.from_columns("/signals/closure", when, rr.Scalars.columns(scalars=task.closure(states)))
-    yield Chunk.from_columns("/signals/metres", when, rr.Scalars.columns(scalars=metres))
+    times = scene.timelines(first, first + len(states) - 1)
+    yield Chunk.from_columns("/signals/closure", times, rr.Scalars.columns(scalars=task.closure(states)))
+    yield Chunk.from_columns("/signals/metres", times, rr.Scalars.columns(scalars=metres))
 
 
-def action_chunk(taken: np.ndarray, first: int = 0) -> Chunk:
-    """The actions (T, 1) that were taken from step `first` on."""
-    when = scene.timelines(first, first + len(taken) - 1)
-    return Chunk.from_columns("/episode/actions", when, rr.Scalars.columns(scalars=taken))
+def action_chunk(actions: np.ndarray, first: int = 0) -> Chunk:
+    """The agent's actions (T, 1) from step `first` on."""
+    times = scene.timelines(first, first + len(actions) - 1)
+    return Chunk.from_columns("/episode/actions", times, rr.Scalars.columns(scalars=actions))
 
 
 def line_styles() -> list[Chunk]:
-    """Names and colours of the plotted lines, the same for every episode."""
+    """Names and colours of the plotted lines; equal for all episodes."""
     return [
-        scene.static(entity, rr.SeriesLines(names=list(looks), colors=list(looks.values()), widths=[2.0] * len(looks)))
-        for entity, looks in LINES.items()
+        scene.static(entity, rr.SeriesLines(names=list(style), colors=list(style.values()), widths=[2.0] * len(style)))
+        for entity, style in LINES.items()
     ]
 
 
 def outcome(episode: Episode) -> str:
-    """How the episode ended, in a few words."""
+    """How the episode ended: "success", "bottle fell", "held too briefly", "not lifted" or "agent failed"."""
     if episode.failure:
         return "agent failed"
     if episode.terminated:
@@ -78,15 +81,15 @@ def outcome(episode: Episode) -> str:
 
 
 def text_card(episode: Episode, properties: Mapping[str, object]) -> Chunk:
-    """Outcome, properties and setting, to be read beside the plots."""
-    told = {
+    """A table of outcome, properties and setting as text, which the viewer shows beside the plots."""
+    entries = {
         **properties,
         "reach": episode.setting.reach,
         "offset": f"{episode.setting.offset_x * 100:+.1f} cm, {episode.setting.offset_y * 100:+.1f} cm",
         "duration noise": f"{episode.setting.duration_noise:+.2f}",
     }
-    told |= {"failure": episode.failure} if episode.failure else {}
-    cells = [f"| {_cell(name.replace('_', ' '))} | {_cell(value)} |" for name, value in told.items()]
+    entries |= {"failure": episode.failure} if episode.failure else {}
+    cells = [f"| {_cell(name.replace('_', ' '))} | {_cell(value)} |" for name, value in entries.items()]
     cells += ["| | |"] * (len(cells) % 2)
     rows = "\n".join(left + right[1:] for left, right in zip(cells[::2], cells[1::2], strict=True))
     title = f"### {outcome(episode).capitalize()}: {episode.score:g} of {task.SUCCESS:g}, {len(episode.actions)} steps"
@@ -96,29 +99,30 @@ def text_card(episode: Episode, properties: Mapping[str, object]) -> Chunk:
 
 def _cell(value: object) -> str:
     text = f"{value:.4g}" if isinstance(value, float) else str(value)
-    text = text[:8] if len(text) == DIGEST else text
+    text = text[:8] if len(text) == HASH_LENGTH else text
     return text.replace("|", "/")
 
 
 @cache
-def blueprint(foretold: bool = False, live: bool = False) -> rrb.Blueprint:
-    """3D view on the left; card and plots on the right; where success is foretold its curve and its ridge plot too.
+def blueprint(with_predictions: bool = False, live: bool = False) -> rrb.Blueprint:
+    """Layout with the 3D view on the left, and text card and plots on the right.
 
-    What is `live` is shown as it comes.
+    With predictions it also has the success curve and the ridge plot. With `live` the viewer follows the newest step.
     """
     text = rrb.TextDocumentView(origin="/card", name="Episode")
-    plots = [_plot(name, *told) for name, told in (FORETOLD if foretold else PLOTS).items()]
-    told = rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3])
-    if foretold:
-        seen = rrb.Vertical(space(), _bars(), row_shares=[5, 2])
-        content = rrb.Horizontal(seen, told, _ridge(), column_shares=[9, 7, 4])
+    titles = PLOTS_WITH_PREDICTIONS if with_predictions else PLOTS
+    plots = [_plot(title, entities, span) for title, (entities, span) in titles.items()]
+    column = rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3])
+    if with_predictions:
+        first_column = rrb.Vertical(spatial_view(), _bars(), row_shares=[5, 2])
+        content = rrb.Horizontal(first_column, column, _ridge(), column_shares=[9, 7, 4])
     else:
-        content = rrb.Horizontal(space(), told, column_shares=[3, 2])
+        content = rrb.Horizontal(spatial_view(), column, column_shares=[3, 2])
     return page(content, live)
 
 
 def page(content: rrb.Container, live: bool = False) -> rrb.Blueprint:
-    """Content with the time below it, and nothing else open."""
+    """A layout of the content with the time panel below it; all other panels are hidden."""
     return rrb.Blueprint(
         content,
         rrb.TimePanel(timeline="step", fps=50.0, play_state="following" if live else "paused", state="collapsed"),
@@ -129,8 +133,8 @@ def page(content: rrb.Container, live: bool = False) -> rrb.Blueprint:
     )
 
 
-def space(root: str = "", name: str = "Grasp") -> rrb.Spatial3DView:
-    """The 3D view of the world below a root, framed on the grasp."""
+def spatial_view(root: str = "", name: str = "Grasp") -> rrb.Spatial3DView:
+    """The 3D view of the entities below a root, with the camera on the grasp."""
     eye = rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=EYE, look_target=TARGET, eye_up=(0, 0, 1))
     start, now = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative()
     trail = rrb.VisibleTimeRanges([rrb.VisibleTimeRange(line, start=start, end=now) for line in ("step", "seconds")])
@@ -144,12 +148,12 @@ def space(root: str = "", name: str = "Grasp") -> rrb.Spatial3DView:
     )
 
 
-def _plot(name: str, entities: tuple[str, ...], span: tuple[float, float]) -> rrb.TimeSeriesView:
+def _plot(title: str, entities: tuple[str, ...], span: tuple[float, float]) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
-        name=name,
+        name=title,
         contents=list(entities),
         axis_y=rrb.ScalarAxis(range=span, zoom_lock=True),
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=name == METRES),
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop, visible=title == METRES),
     )
 
 

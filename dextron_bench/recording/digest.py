@@ -1,4 +1,4 @@
-"""A digest of everything a recording says, whatever its bytes: two files with equal content have equal digests."""
+"""Digest of a recording's content: files with equal content have equal digests, even if their bytes differ."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 import pyarrow as pa
 from rerun.chunk import Chunk
 
-ROW_ID = "rerun.controls.RowId"  # Random, and says nothing.
+ROW_ID = "rerun.controls.RowId"  # Random, and not part of the content.
 
 
 def digest(lines: Iterable[str]) -> str:
-    """SHA-256, hexadecimal, of the lines of a recording's chunks in any order."""
+    """SHA-256, hexadecimal, of the lines of a recording's chunks; their order does not matter."""
     return hashlib.sha256("\n".join(sorted(lines)).encode()).hexdigest()
 
 
 def lines(chunks: Iterable[Chunk]) -> Iterable[str]:
-    """Entity, name and SHA-256 of the values of each column of the chunks."""
+    """One line for each column of the chunks: entity, name and SHA-256 of the values."""
     for chunk in chunks:
         batch = chunk.to_record_batch()
         for name, column in zip(batch.schema.names, batch.columns, strict=True):
@@ -27,7 +27,7 @@ def lines(chunks: Iterable[Chunk]) -> Iterable[str]:
 
 
 def _pieces(column: pa.Array) -> Iterable[bytes | memoryview]:
-    """The bytes that make up a column: its type, the lengths of its lists, and its values."""
+    """The bytes of a column: its type, the lengths of its lists, and its values."""
     kind = column.type
     yield f"{kind} {len(column)} {column.null_count};".encode()
     if pa.types.is_list(kind):
@@ -40,8 +40,8 @@ def _pieces(column: pa.Array) -> Iterable[bytes | memoryview]:
             yield from _pieces(part)
     elif pa.types.is_union(kind):
         yield column.type_codes.to_numpy().tobytes()
-        for place in range(kind.num_fields):
-            yield from _pieces(column.field(place))
+        for index in range(kind.num_fields):
+            yield from _pieces(column.field(index))
     elif column.null_count == 0 and pa.types.is_primitive(kind) and kind.bit_width >= 8:
         width = kind.bit_width // 8
         yield memoryview(column.buffers()[1])[column.offset * width : (column.offset + len(column)) * width]

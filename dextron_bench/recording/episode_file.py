@@ -1,6 +1,6 @@
-"""Episodes to .rrd files and back, bit for bit, with a digest that tells damage.
+"""Writes episodes to .rrd files and reads them back, bit for bit.
 
-A digest over every value in the file is kept among its properties: Rerun itself does not notice a flipped byte.
+A property of the file holds a digest of all values, because Rerun itself does not notice a flipped byte.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ Value = str | int | float | bool
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """An episode as its file tells it, and the properties that were given with it."""
+    """An episode from a file, and the properties that were given when it was written."""
 
     episode: Episode
     properties: dict[str, Value]
 
 
 class BrokenRecording(ValueError):
-    """A file that is no whole recording of this project."""
+    """A file is damaged, incomplete, or no recording of this project."""
 
-    def __init__(self, file: Path, what: str) -> None:
-        super().__init__(f"{file}: {what}")
+    def __init__(self, file: Path, fault: str) -> None:
+        super().__init__(f"{file}: {fault}")
 
 
 def write(
@@ -52,73 +52,72 @@ def write(
     episode: Episode,
     path: reach.Path,
     properties: Mapping[str, Value],
-    insight: StepPredictions | None = None,
+    predictions: StepPredictions | None = None,
 ) -> str:
-    """Writes an episode that followed `path` to `file`, whole or not at all; returns the file's SHA-256.
+    """Writes an episode on the palm's `path` to `file` atomically; returns the SHA-256 of the file.
 
-    With `insight` it also shows what the success model thinks at each step.
-
-    Raises UnwritableRecording, and ValueError where the arrays make no episode.
+    With `predictions` the recording also shows what the success model predicts at each step. Raises
+    UnwritableRecording, and ValueError if the arrays are not those of an episode.
     """
     rr.set_strict_mode(True)
     chunks = [*_chunks(episode, properties), scene.planned_path(path), *scene.chunks(episode.states)]
-    if insight:
+    if predictions:
         last = len(episode.actions) - 1
-        chunks += [*success_plots.static_chunks(insight.grid), *success_plots.chunks(insight, episode.actions)]
-        chunks += success_plots.ridge(insight, episode.actions[:, 0], last, episode.success)
-    props, told = _props()
-    identity = digest([*told, *lines(chunks)])
-    chunks += [*props, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
-    application = rrd_file.APPLICATION if insight else rrd_file.PLAIN
-    return rrd_file.save(file, chunks, identity, blueprint.blueprint(insight is not None), application)
+        chunks += [*success_plots.static_chunks(predictions.grid), *success_plots.chunks(predictions, episode.actions)]
+        chunks += success_plots.ridge(predictions, episode.actions[:, 0], last, episode.success)
+    static, static_lines = _static_chunks()
+    identity = digest([*static_lines, *lines(chunks)])
+    chunks += [*static, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
+    application = rrd_file.APPLICATION if predictions else rrd_file.PLAIN
+    return rrd_file.save(file, chunks, identity, blueprint.blueprint(predictions is not None), application)
 
 
 def read(file: Path, sha256: str | None = None) -> Recording:
-    """The episode in `file`, its arrays bit for bit as they were written; raises BrokenRecording.
+    """The episode in `file`, with arrays bit-equal to the written ones; raises BrokenRecording.
 
-    The file's SHA-256, if given, is checked before anything is decoded; without it `read_safely` is for files
-    that may be damaged, since Rerun's decoder can abort the process.
+    If the file's SHA-256 is given, it is checked before anything is decoded. For a file that may be damaged and has no
+    known SHA-256 use `read_safely`, because Rerun's decoder can abort the process.
     """
     chunks = _load(file, sha256)
-    kept = [chunk for chunk in chunks if chunk.entity_path != "/__properties/digest"]
-    told = _properties(chunks, "digest").get("sha256")
-    if told is None:
-        raise BrokenRecording(file, f"is no recording of {APPLICATION}: it carries no digest of its content")
-    if told != digest(lines(kept)):
+    content = [chunk for chunk in chunks if chunk.entity_path != "/__properties/digest"]
+    stored_digest = _properties(chunks, "digest").get("sha256")
+    if stored_digest is None:
+        raise BrokenRecording(file, f"is no recording of {APPLICATION}: it has no digest of its content")
+    if stored_digest != digest(lines(content)):
         raise BrokenRecording(file, "its content does not match its digest; it was damaged or changed after writing")
-    facts: dict[str, Any] = _properties(kept, "episode")
+    values: dict[str, Any] = _properties(content, "episode")
     try:
-        setting = Setting(*(facts[name] for name in Setting.__slots__))
-        arrays = {name: _array(kept, name) for name in ARRAYS}
-        episode = Episode(setting, **arrays, **{name: facts[name] for name in ENDS})
+        setting = Setting(*(values[name] for name in Setting.__slots__))
+        arrays = {name: _array(content, name) for name in ARRAYS}
+        episode = Episode(setting, **arrays, **{name: values[name] for name in ENDS})
     except (ValueError, TypeError) as error:
-        raise BrokenRecording(file, f"holds arrays that make no episode ({error})") from error
+        raise BrokenRecording(file, f"holds arrays that are not those of an episode ({error})") from error
     except (KeyError, StopIteration) as error:
         lacking = f"it lacks {error}" if isinstance(error, KeyError) else "it lacks an array"
         raise BrokenRecording(file, f"is a recording of another version of {APPLICATION}: {lacking}") from error
-    return Recording(episode, _properties(kept, "run"))
+    return Recording(episode, _properties(content, "run"))
 
 
 @cache
-def _props() -> tuple[list[Chunk], list[str]]:
-    """What every recording has, and its lines of the digest."""
+def _static_chunks() -> tuple[list[Chunk], list[str]]:
+    """Chunks that are equal in every recording, and their lines for the digest."""
     chunks = [*scene.static_chunks(), *blueprint.line_styles()]
     return chunks, list(lines(chunks))
 
 
 def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk]:
-    """What is kept of the episode, and what is plotted and told of it."""
+    """Arrays and properties of the episode, its text card, and the signals that are plotted."""
     steps = len(episode.actions)
     shapes = (steps + 1, model.STATE), (steps, 1), (steps,)
     for name, shape, first in zip(ARRAYS, shapes, (0, 0, 1), strict=True):
         values = getattr(episode, name)
         if not steps or values.shape != shape or values.dtype != np.float64:
             raise ValueError(f"{name} of {steps} steps must be float64 {shape}, not {values.dtype} {values.shape}")
-        when = scene.timelines(first, first + len(values) - 1)
-        yield Chunk.from_columns(f"/episode/{name}", when, rr.Scalars.columns(scalars=values))
-    facts = {**asdict(episode.setting), **{name: getattr(episode, name) for name in ENDS}}
-    facts |= {"steps": steps, "episode_return": episode.score, "outcome": blueprint.outcome(episode)}
-    yield Chunk.from_property("episode", rr.AnyValues(**_values(facts)))
+        times = scene.timelines(first, first + len(values) - 1)
+        yield Chunk.from_columns(f"/episode/{name}", times, rr.Scalars.columns(scalars=values))
+    episode_properties = {**asdict(episode.setting), **{name: getattr(episode, name) for name in ENDS}}
+    episode_properties |= {"steps": steps, "episode_return": episode.score, "outcome": blueprint.outcome(episode)}
+    yield Chunk.from_property("episode", rr.AnyValues(**_values(episode_properties)))
     if properties:
         yield Chunk.from_property("run", rr.AnyValues(**_values(properties)))
     yield blueprint.text_card(episode, properties)
@@ -126,7 +125,7 @@ def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk
 
 
 def _values(properties: Mapping[str, Value]) -> dict[str, pa.Array]:
-    """Arrow values; left to itself, Rerun drops empty strings."""
+    """Properties as Arrow arrays, because Rerun drops empty strings otherwise."""
     return {name: pa.array([value]) for name, value in properties.items()}
 
 
@@ -135,26 +134,28 @@ def _load(file: Path, sha256: str | None) -> list[Chunk]:
     if not file.is_file():
         raise BrokenRecording(file, "there is no such file")
     if sha256 not in (None, hashlib.sha256(file.read_bytes()).hexdigest()):
-        raise BrokenRecording(file, "is not the file whose SHA-256 was kept; it was damaged or changed after writing")
+        raise BrokenRecording(
+            file, "does not have the SHA-256 that was stored for it; it was damaged or changed after writing"
+        )
     try:
         return RrdReader(file).store().stream().to_chunks()
-    except Exception as error:  # Rerun's readers raise whatever they meet.
+    except Exception as error:  # Rerun's readers raise errors of any type.
         reason = str(error).splitlines()[0]
         raise BrokenRecording(file, f"is cut short, damaged, or no .rrd file ({reason})") from error
 
 
 def _properties(chunks: Iterable[Chunk], name: str) -> dict[str, Value]:
-    """The named group of properties."""
-    found: dict[str, Value] = {}
+    """All properties in the named group."""
+    properties: dict[str, Value] = {}
     for chunk in chunks:
         if chunk.entity_path == f"/__properties/{name}":
             columns = chunk.to_record_batch().to_pydict()
-            found |= {key: values[0][0] for key, values in columns.items() if not key.startswith("rerun.")}
-    return found
+            properties |= {key: values[0][0] for key, values in columns.items() if not key.startswith("rerun.")}
+    return properties
 
 
 def _array(chunks: Iterable[Chunk], name: str) -> np.ndarray:
-    """An exact array of the episode, in the shape in which it was given."""
+    """An array of the episode, exact and in its original shape."""
     chunk = next(chunk for chunk in chunks if chunk.entity_path == f"/episode/{name}" and not chunk.is_static)
     values = chunk.to_record_batch().column("Scalars:scalars").flatten().to_numpy()
     return values.copy() if name == "rewards" else values.reshape(chunk.num_rows, -1).copy()

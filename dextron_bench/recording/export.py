@@ -1,4 +1,4 @@
-"""Recordings as other files: films, and tables with a row for each step."""
+"""Exports recordings to other formats: films, and tables with one row for each step."""
 
 from __future__ import annotations
 
@@ -10,48 +10,51 @@ import pandas as pd
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.recording import film, summaries
 from dextron_bench.storage import atomic
+from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import model
 
 FILMS = {".mp4": film.mp4, ".gif": film.gif}
 TABLES = (".csv", ".parquet")
 
 
-class UnknownEnding(ValueError):
-    """A file name that does not end like any of the formats."""
+class UnknownSuffix(ValueError):
+    """No export format has the suffix of the file name."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(f"{file}: cannot export to {file.suffix!r}; choose from {', '.join([*FILMS, *TABLES])}")
 
 
-def export(source: Path, into: Path, look: film.FilmStyle, report: film.Report = lambda done, total: None) -> None:
-    """Writes a recording's episode to `into`, in the format that its name ends with, whole or not at all.
+def export(source: Path, into: Path, style: film.FilmStyle, progress: Progress = no_progress) -> None:
+    """Writes the episode of a recording to `into` atomically, in the format that the file's suffix names.
 
-    `look` is that of films, and `report` is told (pictures drawn, all). Raises UnknownEnding, BrokenRecording,
-    NoGraphics, NoEncoder.
+    `style` is for films; `progress` receives numbers of frames. Raises UnknownSuffix, BrokenRecording, ReaderError,
+    NoGraphics, NoEncoder, OSError.
     """
-    ending = into.suffix.lower()
-    if ending not in (*FILMS, *TABLES):
-        raise UnknownEnding(into)
+    suffix = into.suffix.lower()
+    if suffix not in (*FILMS, *TABLES):
+        raise UnknownSuffix(into)
     episode = summaries.read_safely(source).episode
-    if ending in FILMS:
-        atomic.write_atomically(into, lambda part: FILMS[ending](part, episode.states, look, report))
-    elif ending == ".csv":
+    if suffix in FILMS:
+        atomic.write_atomically(into, lambda part: FILMS[suffix](part, episode.states, style, progress))
+    elif suffix == ".csv":
         atomic.write_atomically(into, lambda part: step_table(episode).to_csv(part, index=False))
     else:
         atomic.write_atomically(into, lambda part: step_table(episode).to_parquet(part, index=False))
 
 
 def step_table(episode: Episode) -> pd.DataFrame:
-    """A row for each of an episode's T + 1 states: `step`, `seconds`, the state, the action that was taken in it and
-    the reward that the action earned; the last state has neither.
+    """A table with one row for each of an episode's T + 1 states.
+
+    Columns are `step`, `seconds`, the numbers of the state, `action` and `reward`. The reward is for the action in the
+    same row. The last state has neither: both are NaN.
     """
     count = len(episode.states)
-    after = {"action": episode.actions[:, 0], "reward": episode.rewards}
+    per_action = {"action": episode.actions[:, 0], "reward": episode.rewards}
     return pd.DataFrame(
         {
             "step": np.arange(count),
             "seconds": np.round(np.arange(count) * model.CONTROL_STEP, 9),
             **dict(zip(model.state_names(), episode.states.T, strict=True)),
-            **{name: np.append(values, np.nan) for name, values in after.items()},
+            **{name: np.append(values, np.nan) for name, values in per_action.items()},
         }
     )

@@ -1,8 +1,8 @@
-"""Films of episodes, rendered off screen: MP4 by PyAV, and GIF by Pillow."""
+"""Writes films of episodes, rendered off screen: MP4 with PyAV, GIF with Pillow."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -11,29 +11,28 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import model
 from dextron_bench.world.rendering import renderer
 
-RATES = {".mp4": 1.0 / model.CONTROL_STEP, ".gif": 25.0}  # [1/s] pictures at most; many viewers slow quicker GIFs down.
-TICK = 10  # [ms] in which a GIF counts.
-SIZES = (16, 2160)  # [pixels] a side.
+RATES = {".mp4": 1.0 / model.CONTROL_STEP, ".gif": 25.0}  # [1/s] highest frame rates; many viewers slow faster GIFs.
+TICK = 10  # [ms] unit of the durations in a GIF.
+SIZES = (16, 2160)  # [pixels] range of width and height.
 SPEEDS = (0.02, 50.0)
-QUALITY = "18"  # Constant rate factor of x264: less is better, and larger.
-
-Report = Callable[[int, int], None]  # Told (pictures drawn, all).
+QUALITY = "18"  # Constant rate factor of x264: a lower value gives a better and larger film.
 
 
 class BadFilmStyle(ValueError):
-    """A film that cannot be made so."""
+    """A film cannot have this size or speed."""
 
 
 class NoEncoder(RuntimeError):
-    """No way to write MP4."""
+    """PyAV is not installed, so MP4 cannot be written."""
 
 
 @dataclass(frozen=True, slots=True)
 class FilmStyle:
-    """How a film looks: its size [pixels], whence it is seen, and how many times as quick as life.
+    """Size [pixels], camera and speed of a film; at speed 1 it plays in real time.
 
     Raises BadFilmStyle, UnknownCamera.
     """
@@ -46,58 +45,61 @@ class FilmStyle:
     def __post_init__(self) -> None:
         for name, size in (("width", self.width), ("height", self.height)):
             if size % 2 or not SIZES[0] <= size <= SIZES[1]:
-                raise BadFilmStyle(
-                    f"{name} {size}: films have an even number of pixels from {SIZES[0]} to {SIZES[1]} a side"
-                )
+                raise BadFilmStyle(f"{name} {size}: choose an even number of pixels from {SIZES[0]} to {SIZES[1]}")
         if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
-            raise BadFilmStyle(f"speed {self.speed:g}: choose from {SPEEDS[0]:g} to {SPEEDS[1]:g} times life's")
+            raise BadFilmStyle(
+                f"speed {self.speed:g}: choose a factor from {SPEEDS[0]:g} to {SPEEDS[1]:g}; 1 is real time"
+            )
         if self.camera not in renderer.CAMERAS:
             raise renderer.UnknownCamera(self.camera)
 
 
 def shown_steps(count: int, rate: float, speed: float) -> tuple[list[int], float]:
-    """Which of `count` states a film shows, the last one always, and how many a second [1/s], `rate` at most."""
+    """Indices of the states that a film of `count` states shows, always with the last, and its frame rate [1/s].
+
+    The frame rate is `rate` at most.
+    """
     stride = max(1.0, speed / model.CONTROL_STEP / rate)
     shown = [int(k * stride + 1e-9) for k in range(int((count - 1) / stride + 1e-9) + 1)]
     return [*shown, *([count - 1] if shown[-1] != count - 1 else [])], speed / model.CONTROL_STEP / stride
 
 
-def mp4(file: Path, states: np.ndarray, look: FilmStyle, report: Report) -> None:
-    """Writes states (T, 48) as H.264 to `file`, whatever it is called; raises NoEncoder, NoGraphics."""
+def mp4(file: Path, states: np.ndarray, style: FilmStyle, progress: Progress = no_progress) -> None:
+    """Writes states (T, 48) as H.264 in MP4, whatever the file's suffix; raises NoEncoder, NoGraphics."""
     av = _encoder()
-    shown, rate = shown_steps(len(states), RATES[".mp4"], look.speed)
+    shown, rate = shown_steps(len(states), RATES[".mp4"], style.speed)
     with av.open(str(file), "w", format="mp4", options={"movflags": "faststart"}) as container:
         stream = container.add_stream("libx264", Fraction(rate).limit_denominator(1000), {"crf": QUALITY})
-        stream.width, stream.height, stream.pix_fmt = look.width, look.height, "yuv420p"
-        for picture in _pictures(states[shown], look, report):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, "rgb24")))
-        container.mux(stream.encode())  # What it still holds back.
+        stream.width, stream.height, stream.pix_fmt = style.width, style.height, "yuv420p"
+        for frame in _frames(states[shown], style, progress):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, "rgb24")))
+        container.mux(stream.encode())  # Writes the frames that the encoder still holds.
 
 
-def gif(file: Path, states: np.ndarray, look: FilmStyle, report: Report) -> None:
-    """Writes states (T, 48) as an endless GIF of one palette to `file`, whatever it is called; raises NoGraphics."""
-    shown, rate = shown_steps(len(states), RATES[".gif"], look.speed)
+def gif(file: Path, states: np.ndarray, style: FilmStyle, progress: Progress = no_progress) -> None:
+    """Writes states (T, 48) as a looping GIF with one palette, whatever the file's suffix; raises NoGraphics."""
+    shown, rate = shown_steps(len(states), RATES[".gif"], style.speed)
     ends = np.rint(1000.0 / rate / TICK * np.arange(len(shown) + 1)) * TICK
-    palette = _palette(states[[0, len(states) // 2, -1]], look)
-    drawn = (
-        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
-        for picture in _pictures(states[shown], look, report)
+    palette = _palette(states[[0, len(states) // 2, -1]], style)
+    images = (
+        Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+        for frame in _frames(states[shown], style, progress)
     )
-    first = next(drawn)
+    first = next(images)
     durations = np.diff(ends).astype(int).tolist()
-    first.save(file, "GIF", save_all=True, append_images=drawn, duration=durations, loop=0)
+    first.save(file, "GIF", save_all=True, append_images=images, duration=durations, loop=0)
 
 
-def _pictures(states: np.ndarray, look: FilmStyle, report: Report = lambda done, total: None) -> Iterator[np.ndarray]:
-    with renderer.Painter(look.width, look.height, supersampling=1) as painter:
+def _frames(states: np.ndarray, style: FilmStyle, progress: Progress = no_progress) -> Iterator[np.ndarray]:
+    with renderer.Renderer(style.width, style.height, supersampling=1) as frame_renderer:
         for done, state in enumerate(states, start=1):
-            yield painter.paint(state, renderer.CAMERAS[look.camera])
-            report(done, len(states))
+            yield frame_renderer.render(state, renderer.CAMERAS[style.camera])
+            progress(done, len(states))
 
 
-def _palette(states: np.ndarray, look: FilmStyle) -> Image.Image:
-    """The colours of some states' pictures."""
-    return Image.fromarray(np.concatenate(list(_pictures(states, look)))).quantize(256, dither=Image.Dither.NONE)
+def _palette(states: np.ndarray, style: FilmStyle) -> Image.Image:
+    """An image with the palette of the frames of some states."""
+    return Image.fromarray(np.concatenate(list(_frames(states, style)))).quantize(256, dither=Image.Dither.NONE)
 
 
 def _encoder() -> Any:

@@ -1,4 +1,4 @@
-"""An episode shown in the viewer while it is played."""
+"""Shows an episode in Rerun's viewer while it is played."""
 
 from __future__ import annotations
 
@@ -16,66 +16,66 @@ from dextron_bench.recording import blueprint, scene, success_plots, viewer
 from dextron_bench.recording.rrd_file import APPLICATION
 from dextron_bench.world import task
 
-EVERY = 5  # Steps after which the ridge plot is drawn again.
+RIDGE_EVERY = 5  # Steps between two updates of the ridge plot.
 
-Connect = Callable[[rr.RecordingStream], None]  # Says where a stream goes.
+Connect = Callable[[rr.RecordingStream], None]  # Connects a stream to a viewer or to a file.
 
 
 class LiveView:
-    """The viewer's picture of one episode under way."""
+    """One episode in the viewer, step by step: an `Observer` of `dextron_bench.success.live`."""
 
     def __init__(self, connect: Connect, name: str, path: reach.Path, about: Mapping[str, object]) -> None:
-        """Shows hand, bottle and path before the first step."""
+        """Shows the scene and the palm's path, and a card with the entries of `about`."""
         rr.set_strict_mode(True)
         self._stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)
         connect(self._stream)
-        self._stream.send_blueprint(blueprint.blueprint(foretold=True, live=True))
+        self._stream.send_blueprint(blueprint.blueprint(with_predictions=True, live=True))
         table = "\n".join(f"| {name} | {value} |" for name, value in about.items())
         text = rr.TextDocument(f"### Live\n\n| | |\n|---|---|\n{table}\n", media_type="text/markdown")
-        props = [
-            *scene.static_chunks(),
-            *blueprint.line_styles(),
-            scene.planned_path(path),
-            scene.static("/card", text),
-        ]
-        self._stream.send_chunks(props)
+        static = [*scene.static_chunks(), *blueprint.line_styles()]
+        self._stream.send_chunks([*static, scene.planned_path(path), scene.static("/card", text)])
         self._last = min(len(path.positions) - 1 + task.HOLD, task.STEP_LIMIT)
 
-    def show(self, states: np.ndarray, actions: np.ndarray, insight: StepPredictions) -> None:
-        """Shows the last of the states (T, 48), actions (T, 1) and thoughts of an episode so far."""
+    def show(self, states: np.ndarray, actions: np.ndarray, predictions: StepPredictions) -> None:
+        """Shows the last step; states (T, 48), actions (T, 1) and predictions are those of all steps so far."""
         now = len(states) - 1
         before = max(now - 1, 0)
-        part = StepPredictions(
-            insight.grid, insight.curves[now:], insight.chances[now:], insight.experts[now:], insight.duration
+        last = StepPredictions(
+            predictions.grid,
+            predictions.curves[now:],
+            predictions.chances[now:],
+            predictions.experts[now:],
+            predictions.duration,
         )
         chunks = [*scene.chunks(states[before:], before), *blueprint.signals(states[now:], now)]
-        chunks += [blueprint.action_chunk(actions[now:], now), *success_plots.chunks(part, actions[now:], now)]
+        chunks += [blueprint.action_chunk(actions[now:], now), *success_plots.chunks(last, actions[now:], now)]
         if now == 0:
-            chunks += success_plots.static_chunks(insight.grid)
-        if now % EVERY == 0:
-            chunks += success_plots.ridge(insight, actions[:, 0], self._last)
+            chunks += success_plots.static_chunks(predictions.grid)
+        if now % RIDGE_EVERY == 0:
+            chunks += success_plots.ridge(predictions, actions[:, 0], self._last)
         self._stream.send_chunks(chunks)
 
-    def close(self, actions: np.ndarray, insight: StepPredictions, success: bool) -> None:
-        """Colours the ridge plot by the outcome, and lets go of the stream."""
-        self._stream.send_chunks(success_plots.ridge(insight, actions[:, 0], self._last, success))
+    def close(self, actions: np.ndarray, predictions: StepPredictions, success: bool) -> None:
+        """Colours the ridge plot by the outcome and closes the stream."""
+        self._stream.send_chunks(success_plots.ridge(predictions, actions[:, 0], self._last, success))
         self._stream.disconnect()
         flush_and_cleanup_orphaned_recordings()
 
 
 @contextmanager
 def open_live_viewer(*arguments: str) -> Iterator[tuple[Connect, Callable[[], None]]]:
-    """The native viewer, reachable from this machine only: how streams reach it, and how to wait until it is closed.
+    """Opens the native viewer, which only this machine can reach.
 
-    Both raise ViewerError where it is gone, as does this.
+    Yields a function that connects a stream to the viewer, and a function that waits until the user closes it. These
+    functions and this one raise ViewerError if the viewer is not running.
     """
     port = viewer.free_port()
-    with viewer.viewer_process(["--port", str(port), "--hide-welcome-screen", *arguments]) as opened:
-        where = viewer.address(port, opened)
+    with viewer.viewer_process(["--port", str(port), "--hide-welcome-screen", *arguments]) as process:
+        address = viewer.address(port, process)
 
         def connect(stream: rr.RecordingStream) -> None:
-            if opened.poll() is not None:
-                raise viewer.ViewerError(f"Rerun's viewer is gone (code {opened.returncode}); nothing more is played")
-            stream.connect_grpc(where)
+            if (code := process.poll()) is not None:
+                raise viewer.ViewerError(f"Rerun's viewer was closed (code {code}); no more episodes are played")
+            stream.connect_grpc(address)
 
-        yield connect, partial(viewer.wait, opened)
+        yield connect, partial(viewer.wait, process)

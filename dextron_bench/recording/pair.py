@@ -1,4 +1,4 @@
-"""Two recordings of the same setting, side by side in one."""
+"""Combines two recordings of the same setting in one file, side by side."""
 
 from __future__ import annotations
 
@@ -14,68 +14,69 @@ from dextron_bench.recording.episode_file import Recording
 from dextron_bench.recording.summaries import PAIR, read_safely
 
 SIDES = "/a", "/b"
-PLOTS = {  # Title of each plot, what of each side is in it, and its range.
+PLOTS = {  # Title of each plot, its entities on each side, and the range of its axis.
     "Action": (("/episode/actions",), (-1.1, 1.1)),
     "Hand closure": (("/signals/closure",), (-0.1, 1.1)),
     "Palm's distance, bottle's height [m]": (("/signals/metres",), (0.0, 0.7)),
     "Reward, predicted success": (("/episode/rewards", "/success/chance"), (-0.1, 1.1)),
 }
-SHARED = ("threshold", "lifted")  # Lines that are the same on both sides; one of each is enough.
+SHARED = ("threshold", "lifted")  # Lines that are equal on both sides; only one of each is drawn.
 
 
 class UnequalSettings(ValueError):
-    """Two recordings that are not of the same setting."""
+    """Two recordings have different settings."""
 
 
 def write_pair(file: Path, first: Path, second: Path) -> Path:
-    """Writes one recording in which two of equal settings play at once; returns it.
+    """Writes two recordings of the same setting into one file for the viewer; returns the file.
 
-    Raises BrokenRecording, UnequalSettings, UnwritableRecording. It is for looking: `read` takes single episodes.
+    `read` cannot read it. Raises BrokenRecording, ReaderError, UnequalSettings, UnwritableRecording.
     """
-    sides = [read_safely(each) for each in (first, second)]
-    if sides[0].episode.setting != sides[1].episode.setting:
+    recordings = [read_safely(source) for source in (first, second)]
+    if recordings[0].episode.setting != recordings[1].episode.setting:
         raise UnequalSettings(
-            f"{first} and {second} are of other settings; take two of the same row of the same split, as in "
+            f"{first} and {second} have different settings; take two of the same row of the same split, as in "
             "`dextron-bench view --diff runs/bc/synthetic/seed0/recordings/test-0000.rrd "
             "runs/rl/synthetic/seed0/recordings/test-0000.rrd`"
         )
     chunks = [Chunk.from_property(PAIR, rr.AnyValues(a=str(first), b=str(second)))]
-    for side, each in zip(SIDES, (first, second), strict=True):
-        chunks += _moved(each, side)
-        chunks += _lines(side)
-    names = [f"{side[1:].upper()}: {_name(recorded)}" for side, recorded in zip(SIDES, sides, strict=True)]
+    for side, source in zip(SIDES, (first, second), strict=True):
+        chunks += _moved_chunks(source, side)
+        chunks += _line_styles(side)
+    names = [f"{side[1:].upper()}: {_name(recording)}" for side, recording in zip(SIDES, recordings, strict=True)]
     rrd_file.save(file, chunks, ", ".join(names), _blueprint(names), rrd_file.PAIRS)
     return file
 
 
-def _name(recorded: Recording) -> str:
-    told = recorded.properties
-    return f"{told.get('method', 'unknown')}, seed {told['seed']}" if "seed" in told else str(told.get("method", ""))
+def _name(recording: Recording) -> str:
+    run = recording.properties
+    return f"{run.get('method', 'unknown')}, seed {run['seed']}" if "seed" in run else str(run.get("method", ""))
 
 
-def _moved(file: Path, side: str) -> Iterable[Chunk]:
-    """What a recording shows, below the side's own root, without names of lines."""
+def _moved_chunks(file: Path, side: str) -> Iterable[Chunk]:
+    """The visible chunks of a recording with entities below the side's root, without the styles of lines."""
     for chunk in RrdReader(file).store().stream().to_chunks():
         entity = str(chunk.entity_path)
         if not entity.startswith("/__") and not (chunk.is_static and entity in blueprint.LINES):
             yield chunk.with_entity_path(side + entity)
 
 
-def _lines(side: str) -> Iterable[Chunk]:
-    """Lines named after their side; the second side's are paler."""
-    for entity, looks in blueprint.LINES.items():
-        shown = [not (side == SIDES[1] and label.startswith(SHARED)) for label in looks]
-        colours = [tuple(part // 2 + 110 for part in c) if side == SIDES[1] else c for c in looks.values()]
-        names = [f"{side[1:].upper()}: {label}" for label in looks]
-        widths = [2.0 if each else 0.0 for each in shown]
+def _line_styles(side: str) -> Iterable[Chunk]:
+    """Names and colours of a side's lines; the second side has paler colours."""
+    for entity, style in blueprint.LINES.items():
+        colours = [tuple(part // 2 + 110 for part in c) if side == SIDES[1] else c for c in style.values()]
+        names = [f"{side[1:].upper()}: {label}" for label in style]
+        widths = [0.0 if side == SIDES[1] and label.startswith(SHARED) else 2.0 for label in style]
         yield scene.static(side + entity, rr.SeriesLines(names=names, colors=colours, widths=widths))
 
 
 def _blueprint(names: list[str]) -> rrb.Blueprint:
-    """A column for each side, and one in which their lines are together."""
+    """A column with the scene of each side, and a column with plots of both."""
     columns = [
         rrb.Vertical(
-            blueprint.space(side, name), rrb.TextDocumentView(origin=f"{side}/card", name=name), row_shares=[3, 1]
+            blueprint.spatial_view(side, name),
+            rrb.TextDocumentView(origin=f"{side}/card", name=name),
+            row_shares=[3, 1],
         )
         for side, name in zip(SIDES, names, strict=True)
     ]

@@ -1,7 +1,8 @@
-"""Tells what recordings say of themselves, one JSON line a file, in a process that a damaged one may end.
+"""A script that prints the properties of recordings, one line of JSON for each file.
 
-Run as a script, it imports nothing of this package and so starts quickly. Standard input names a file a line, in
-JSON; with the word `whole` all of a file is decoded, not its properties alone.
+It runs in a process of its own, because a damaged file can abort the process that decodes it. It imports nothing of
+this package, so that it starts quickly. Each line of standard input is a file name in JSON. With the argument `whole`
+it decodes all of a file and not only the properties.
 """
 
 from __future__ import annotations
@@ -14,22 +15,22 @@ from typing import Any
 from rerun.chunk import RrdReader
 
 PROPERTIES = "/__properties/"
-MEMORY = 4 << 30  # [bytes] of address space. One flipped bit made Rerun ask for 23 GB (rerun-sdk 0.41).
+MEMORY = 4 << 30  # [bytes] of address space. With one flipped bit Rerun asked for 23 GB (rerun-sdk 0.41).
 
 
 def main() -> None:
-    """Says `null` once it can read, then of each file its applications and properties, or why it has none."""
+    """Prints `null` when it is ready, and then applications and properties of each file, or the error."""
     _bound_memory()
     print("null", flush=True)
     for line in sys.stdin:
         try:
-            told = _told(json.loads(line), "whole" in sys.argv[1:])
-        except Exception as error:  # Rerun's readers raise whatever they meet.
-            told = {"error": " ".join(str(error).split())}
-        print(json.dumps(told), flush=True)
+            description = _describe(json.loads(line), "whole" in sys.argv[1:])
+        except Exception as error:  # Rerun's readers raise errors of any type.
+            description = {"error": " ".join(str(error).split())}
+        print(json.dumps(description), flush=True)
 
 
-def _told(file: str, whole: bool) -> dict[str, Any]:
+def _describe(file: str, whole: bool) -> dict[str, Any]:
     reader, properties = RrdReader(file), {}
     stream = reader.store().stream()
     for chunk in stream if whole else stream.filter(content=f"{PROPERTIES}**"):
@@ -42,7 +43,7 @@ def _told(file: str, whole: bool) -> dict[str, Any]:
 
 
 def _bound_memory() -> None:
-    with suppress(ImportError, OSError, ValueError):  # Not every system can.
+    with suppress(ImportError, OSError, ValueError):  # Not every system supports it.
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))

@@ -1,4 +1,4 @@
-"""Files of Rerun written whole or not at all."""
+"""Writes Rerun's .rrd files atomically."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ from rerun_bindings import (
 
 from dextron_bench.storage import atomic
 
-APPLICATION = "dextron-bench"  # To the viewer, recordings in which success is foretold.
-PLAIN, PAIRS = f"{APPLICATION}-plain", f"{APPLICATION}-pairs"  # Others, since it has one layout an application.
+APPLICATION = "dextron-bench"  # Rerun's application id of recordings with predictions.
+PLAIN, PAIRS = f"{APPLICATION}-plain", f"{APPLICATION}-pairs"  # The viewer has one layout for each application id.
 APPLICATIONS = APPLICATION, PLAIN, PAIRS
 
 
 class UnwritableRecording(OSError):
-    """A recording that could not be written; nothing was."""
+    """A recording cannot be written; the file is unchanged."""
 
-    def __init__(self, file: Path, why: object) -> None:
-        super().__init__(f"cannot write recording {file}: {why}")
+    def __init__(self, file: Path, reason: object) -> None:
+        super().__init__(f"cannot write recording {file}: {reason}")
 
 
 def save(
     file: Path, chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint, application: str = APPLICATION
 ) -> str:
-    """Writes chunks to `file`, whole or not at all; returns the file's SHA-256. Raises UnwritableRecording."""
+    """Writes chunks to `file` atomically; returns the file's SHA-256. Raises UnwritableRecording."""
     try:
         content = _encoded(chunks, identity, blueprint, application)
         atomic.write_atomically(file, lambda part: part.write_bytes(content))
     except (OSError, RuntimeError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise UnwritableRecording(file, why) from error
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise UnwritableRecording(file, reason) from error
     return hashlib.sha256(content).hexdigest()
 
 
 def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint, application: str) -> bytes:
-    """The bytes of an .rrd file; raises RuntimeError where Rerun, switched off, would make none.
+    """The bytes of an .rrd file; raises RuntimeError if the environment variable RERUN switches Rerun off.
 
-    Rerun's own way to a file makes the blueprint anew each time, and leaves two threads behind.
+    Rerun's own function for this encodes the blueprint again for each file, and leaves two threads running.
     """
     recording = rr.RecordingStream(application, recording_id=identity, send_properties=False)
     try:
@@ -56,8 +56,8 @@ def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint, a
             raise RuntimeError("Rerun is switched off by RERUN in the environment; unset it")
         memory = recording.memory_recording()
         recording.send_chunks(chunks)
-        content: bytes = memory.storage.concat_as_bytes(_prepared(blueprint, application))
-        memory.drain_as_bytes()  # Rerun warns of what is left in memory.
+        content: bytes = memory.storage.concat_as_bytes(_encoded_blueprint(blueprint, application))
+        memory.drain_as_bytes()  # Rerun warns about chunks that stay in memory.
         recording.disconnect()
     finally:
         del recording
@@ -66,15 +66,15 @@ def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint, a
 
 
 @lru_cache(maxsize=2)
-def _prepared(blueprint: rrb.Blueprint, application: str) -> PyMemorySinkStorage:
-    """A blueprint, and that it is the one to open with, as Rerun adds them to files; it holds four threads.
+def _encoded_blueprint(blueprint: rrb.Blueprint, application: str) -> PyMemorySinkStorage:
+    """A blueprint and the command that activates it, encoded as in a file. Each one keeps four threads running.
 
-    Rerun (0.41) has no public way to make it once for many files.
+    Rerun (0.41) has no public function that encodes a blueprint once for many files.
     """
-    made = create_in_memory_blueprint(application_id=application, blueprint=blueprint)
+    stream = create_in_memory_blueprint(application_id=application, blueprint=blueprint)
     carrier = rr.RecordingStream._from_native(
         new_blueprint(application_id=application, make_default=False, make_thread_default=False, default_enabled=True)
     )
-    kept = carrier.memory_recording()
-    send_blueprint(made.storage, make_active=False, make_default=True, recording=carrier.to_native())
-    return kept.storage
+    memory = carrier.memory_recording()
+    send_blueprint(stream.storage, make_active=False, make_default=True, recording=carrier.to_native())
+    return memory.storage

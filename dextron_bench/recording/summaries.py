@@ -1,4 +1,4 @@
-"""What recordings say of themselves: quickly, for many at once, and whatever is wrong with them."""
+"""Summaries of recordings: their properties, or their damage. A separate process reads the files."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from dextron_bench.recording import reader_process
 from dextron_bench.recording.episode_file import ENDS, BrokenRecording, Recording, Value, read
 from dextron_bench.recording.rrd_file import APPLICATION, APPLICATIONS
 
-NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Told of every episode.
-PAIR = "pair"  # Property of two episodes in one file, which is for looking alone.
-MAGIC, FOOT = b"RRF2", b"FOOT"  # An .rrd file begins with the one, and has the other before its last four bytes.
-LEAST = 12  # [bytes] of an .rrd file's head.
+NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Properties of every episode.
+PAIR = "pair"  # Property of a file with two episodes, which is only for the viewer.
+MAGIC, FOOT = b"RRF2", b"FOOT"  # An .rrd file starts with MAGIC and has FOOT before its last four bytes.
+HEAD = 12  # [bytes] size of an .rrd file's header.
 
 
 class ReaderError(RuntimeError):
-    """The process that reads recordings could not be started."""
+    """The process that reads recordings cannot start."""
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """A recording's size [bytes] and properties, those of its run and its episode; or what is wrong with it.
+    """Size [bytes] of a recording and the properties of its run and its episode, or its damage in words.
 
-    Of a pair, the only property tells which two recordings it shows.
+    A pair has one property, which names its two recordings.
     """
 
     file: Path
@@ -40,27 +40,30 @@ class Summary:
 
 
 def summarise(files: Iterable[Path], whole: bool = False, hashes: Mapping[Path, str] = {}) -> Iterator[Summary]:
-    """Each file's summary, in order; damage is told, not raised. Raises ReaderError.
+    """The summary of each file, in order. Summaries report damage; only ReaderError is raised.
 
-    Only properties are read, so that a value changed elsewhere in a file goes unnoticed; unless `whole`,
-    which reads everything and compares it with its digest, and with the file's SHA-256 among `hashes`.
+    By default only the properties are read, so changes of other values are not noticed. With `whole` all of a file is
+    read and compared with its digest, and with its SHA-256 if that is in `hashes`.
     """
     for summary in _summaries(files, whole):
-        yield _compared(summary, hashes.get(summary.file)) if whole and not summary.damage else summary
+        yield _verified(summary, hashes.get(summary.file)) if whole and not summary.damage else summary
 
 
 def screen(files: Iterable[Path]) -> Iterator[Summary]:
-    """Summaries of files of unknown origin, each decoded whole, in a process of its own. Raises ReaderError."""
+    """Summaries of files from others: a separate process decodes all of each file. Raises ReaderError."""
     return _summaries(files, whole=True)
 
 
 def read_safely(file: Path) -> Recording:
-    """The episode in a file of unknown origin; raises BrokenRecording, ReaderError."""
+    """The episode in a file that may be damaged: a separate process decodes it first.
+
+    Raises BrokenRecording, ReaderError.
+    """
     return read_screened(next(screen([file])))
 
 
 def read_screened(summary: Summary) -> Recording:
-    """The episode in a file that `screen` summarised; raises BrokenRecording."""
+    """The episode in a file with a summary from `screen`; raises BrokenRecording."""
     if summary.damage:
         raise BrokenRecording(summary.file, summary.damage)
     return read(summary.file)
@@ -68,14 +71,14 @@ def read_screened(summary: Summary) -> Recording:
 
 def _summaries(files: Iterable[Path], whole: bool) -> Iterator[Summary]:
     files = list(files)
-    forms = [_form(file) for file in files]
-    told = _told([file for file, wrong in zip(files, forms, strict=True) if not wrong], whole)
-    for file, wrong in zip(files, forms, strict=True):
-        yield Summary(file, damage=wrong) if wrong else _summary(file, next(told))
+    faults = [_format_fault(file) for file in files]
+    descriptions = _describe([file for file, fault in zip(files, faults, strict=True) if not fault], whole)
+    for file, fault in zip(files, faults, strict=True):
+        yield Summary(file, damage=fault) if fault else _summary(file, next(descriptions))
 
 
-def _compared(summary: Summary, sha256: str | None) -> Summary:
-    """The summary of a file that can be decoded, once its content is held against its digest; pairs have none."""
+def _verified(summary: Summary, sha256: str | None) -> Summary:
+    """The summary, or the damage if the file's content does not match its digest. Pairs have no digest."""
     if PAIR in summary.properties:
         return summary
     try:
@@ -85,13 +88,13 @@ def _compared(summary: Summary, sha256: str | None) -> Summary:
     return summary
 
 
-def _form(file: Path) -> str:
-    """What can be told to be wrong from a file's first and last bytes; nothing where it may be a recording."""
+def _format_fault(file: Path) -> str:
+    """The fault that a file's first and last bytes show; empty if it may be a recording."""
     if not file.is_file():
         return "is no file" if file.exists() else "there is no such file"
     try:
         with file.open("rb") as opened:
-            head = opened.read(LEAST)
+            head = opened.read(HEAD)
             opened.seek(-min(len(head), 8), os.SEEK_END)
             tail = opened.read()
     except OSError as error:
@@ -99,15 +102,15 @@ def _form(file: Path) -> str:
     if not head:
         return "is empty"
     if head[:4] != MAGIC[: len(head)]:
-        other = head[:3] == MAGIC[:3]
-        return "is an .rrd file of another version of Rerun" if other else "is no .rrd file"
+        is_rrd = head[:3] == MAGIC[:3]
+        return "is an .rrd file of another version of Rerun" if is_rrd else "is no .rrd file"
     if tail[:4] != FOOT:
-        return "is cut short, or its writing was: it has no footer"
+        return "is cut short: it has no footer"
     return ""
 
 
-def _told(files: Sequence[Path], whole: bool) -> Iterator[dict[str, Any]]:
-    """What `glance` tells of each file; where one ends its process, another goes on with the next file."""
+def _describe(files: Sequence[Path], whole: bool) -> Iterator[dict[str, Any]]:
+    """What the reader process prints for each file. If a file ends the process, a new one continues with the next."""
     command = [sys.executable, "-P", reader_process.__file__, *(["whole"] if whole else [])]
     while files:
         names = "".join(json.dumps(str(file)) + "\n" for file in files)
@@ -118,23 +121,23 @@ def _told(files: Sequence[Path], whole: bool) -> Iterator[dict[str, Any]]:
         yield from map(json.loads, lines[1:])
         files = files[len(lines) - 1 :]
         if files:
-            yield {"error": f"reading it ended the process that read it, with code {done.returncode}"}
+            yield {"error": f"the process that read it ended with code {done.returncode}"}
             files = files[1:]
 
 
-def _summary(file: Path, told: dict[str, Any]) -> Summary:
-    if "error" in told:
-        return Summary(file, damage=f"is damaged ({told['error'].rpartition(f'{file}: ')[2]})")
-    others = [name for name in told["applications"] if name not in APPLICATIONS]
-    if others or len(told["applications"]) != 1:
-        return Summary(
-            file, damage=f"is no recording of {APPLICATION}, but of {', '.join(others) or 'several episodes'}"
-        )
-    if PAIR in told["properties"]:
-        return Summary(file, file.stat().st_size, {PAIR: " | ".join(map(str, told["properties"][PAIR].values()))})
-    properties = told["properties"].get("run", {}) | told["properties"].get("episode", {})
-    if lacking := [name for name in NEEDED if name not in properties]:
-        return Summary(
-            file, damage=f"is a recording of another version of {APPLICATION}: it does not tell its {lacking[0]}"
-        )
+def _summary(file: Path, description: dict[str, Any]) -> Summary:
+    """The summary of a file from what the reader process printed."""
+    if "error" in description:
+        return Summary(file, damage=f"is damaged ({description['error'].rpartition(f'{file}: ')[2]})")
+    applications, groups = description["applications"], description["properties"]
+    others = [name for name in applications if name not in APPLICATIONS]
+    if others or len(applications) != 1:
+        content = ", ".join(others) or "several episodes"
+        return Summary(file, damage=f"is no recording of {APPLICATION}, but of {content}")
+    if PAIR in groups:
+        return Summary(file, file.stat().st_size, {PAIR: " | ".join(map(str, groups[PAIR].values()))})
+    properties = groups.get("run", {}) | groups.get("episode", {})
+    if missing := [name for name in NEEDED if name not in properties]:
+        damage = f"is a recording of another version of {APPLICATION}: it lacks the property {missing[0]!r}"
+        return Summary(file, damage=damage)
     return Summary(file, file.stat().st_size, properties)

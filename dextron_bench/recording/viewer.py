@@ -1,4 +1,4 @@
-"""Recordings in Rerun's viewer, on a screen or, without one, as pictures."""
+"""Opens recordings in Rerun's viewer, on a screen or as screenshots without one."""
 
 from __future__ import annotations
 
@@ -17,56 +17,56 @@ from typing import IO
 from rerun.experimental import ViewerClient
 
 LOOPBACK = "127.0.0.1"
-PATIENCE = 60.0  # [s] to wait for a viewer to come up.
-NOTICES = 8.0  # [s] after which the viewer's own notices have left the picture.
-SETTLE = 1.5  # [s] after which a new step has been drawn.
+START_TIMEOUT = 60.0  # [s] in which a viewer must start.
+NOTICE_TIME = 8.0  # [s] after which the viewer no longer shows its notices.
+DRAW_TIME = 1.5  # [s] in which the viewer draws a new step.
 
 
 class ViewerError(RuntimeError):
-    """The viewer could not be run."""
+    """Rerun's viewer cannot run."""
 
 
 def view(files: Sequence[Path]) -> None:
-    """Opens recordings in the native viewer, reachable from this machine only, until it is closed.
+    """Opens recordings in the native viewer and waits until the user closes it. Only this machine can reach it.
 
-    Raises ViewerError, and FileNotFoundError for a recording that is not there.
+    Raises ViewerError, and FileNotFoundError if a recording does not exist.
     """
-    _all_there(files)
+    _require(files)
     with viewer_process(["--port", "auto", *map(str, files)]) as opened:
         wait(opened)
 
 
 def wait(opened: subprocess.Popen[bytes]) -> None:
-    """Waits until a viewer is closed; raises ViewerError where it ended otherwise."""
+    """Waits until the user closes a viewer; raises ViewerError if it ends with an error."""
     if opened.wait():
         raise ViewerError(f"Rerun's viewer ended with code {opened.returncode}; does this machine have a screen?")
 
 
 def screenshots(file: Path, pictures: Mapping[int, Path], width: int = 1600, height: int = 900) -> None:
-    """Saves what the viewer shows of a recording, without a screen: control step to PNG file.
+    """Saves screenshots of a recording in the viewer, without a screen; `pictures` maps control steps to PNG files.
 
     Needs a Vulkan driver (Debian: apt install mesa-vulkan-drivers). Raises ViewerError, FileNotFoundError.
     """
-    _all_there([file])
+    _require([file])
     port = free_port()
     window = ["--headless", "--window-size", f"{width}x{height}", "--hide-welcome-screen", "--port", str(port)]
     with TemporaryFile() as logs, viewer_process(window, logs) as opened:
         try:
             client = ViewerClient.connect(address(port, opened))
             client.open(str(file.resolve()))
-            time.sleep(NOTICES)
+            time.sleep(NOTICE_TIME)
             for step, picture in pictures.items():
                 picture.parent.mkdir(parents=True, exist_ok=True)
                 client.set_time("step", sequence=step)
-                time.sleep(SETTLE)
+                time.sleep(DRAW_TIME)
                 client.save_screenshot(str(picture.resolve()))
-        except Exception as error:  # The client raises whatever its server says.
+        except Exception as error:  # The client raises errors of any type.
             logs.seek(0)
-            said = logs.read().decode(errors="replace").strip().splitlines()[-1:]
-            raise ViewerError(f"no screenshot of {file}: {error} {' '.join(said)}") from error
+            last_line = logs.read().decode(errors="replace").strip().splitlines()[-1:]
+            raise ViewerError(f"no screenshot of {file}: {error} {' '.join(last_line)}") from error
 
 
-def _all_there(files: Sequence[Path]) -> None:
+def _require(files: Sequence[Path]) -> None:
     for file in files:
         if not file.is_file():
             raise FileNotFoundError(f"there is no recording {file}")
@@ -74,7 +74,7 @@ def _all_there(files: Sequence[Path]) -> None:
 
 @contextmanager
 def viewer_process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
-    """A viewer process, ended with all its children when the block is left."""
+    """Runs a viewer process; the end of the block ends it and its children."""
     command = [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *arguments]
     environment = {"WGPU_BACKEND": "vulkan", **os.environ} if logs else None
     opened = subprocess.Popen(command, env=environment, stdout=logs, stderr=logs, start_new_session=True)
@@ -87,20 +87,20 @@ def viewer_process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> I
 
 
 def address(port: int, opened: subprocess.Popen[bytes]) -> str:
-    """Where a viewer is reached, once it listens; raises ViewerError."""
-    until = time.monotonic() + PATIENCE
-    while time.monotonic() < until and opened.poll() is None:
+    """The address of a viewer, as soon as it accepts connections; raises ViewerError if it does not start."""
+    deadline = time.monotonic() + START_TIMEOUT
+    while time.monotonic() < deadline and opened.poll() is None:
         try:
             socket.create_connection((LOOPBACK, port), timeout=1).close()
         except OSError:
             time.sleep(0.2)
         else:
             return f"rerun+http://{LOOPBACK}:{port}/proxy"
-    raise ViewerError("Rerun's viewer did not come up; does this machine have a screen?")
+    raise ViewerError("Rerun's viewer did not start; does this machine have a screen?")
 
 
 def free_port() -> int:
-    """A port that nobody listens at."""
+    """A free port of this machine."""
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         return probe.getsockname()[1]

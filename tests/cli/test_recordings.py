@@ -1,4 +1,4 @@
-"""`dextron-bench recordings` from the command line: what there is, what is damaged, and other files made of it."""
+"""`dextron-bench recordings`: the list, damaged recordings, and exports."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     tiny_benchmark.forget()
 
 
-def test_recordings_are_listed_with_what_they_say(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_recordings_are_listed_with_their_properties(here: Path, capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
     assert main.main(["recordings", "list"]) == 0
     printed = capsys.readouterr()
     assert [title in printed.out for title in ("file", "outcome", "kB", "success", "20.000")] == [True] * 5
-    assert [f"{FOLDER}/test-000{row}.rrd" in printed.out for row in (0, 1)] == [True] * 2  # In one piece.
+    assert [f"{FOLDER}/test-000{row}.rrd" in printed.out for row in (0, 1)] == [True] * 2  # Not folded.
     assert printed.err == ""
     assert main.main(["recordings", "list", f"{FOLDER}/test-0001.rrd", "--json", "--check"]) == 0
     (row,) = json.loads(capsys.readouterr().out)
@@ -52,21 +52,21 @@ def test_damaged_recordings_are_a_line_each_and_code_1(here: Path, capsys: pytes
     assert main.main(["recordings", "list"]) == 1
     printed = capsys.readouterr()
     assert printed.err.splitlines() == [
-        f"dextron-bench: {cut}: is cut short, or its writing was: it has no footer",
+        f"dextron-bench: {cut}: is cut short: it has no footer",
         f"dextron-bench: {text}: is no .rrd file",
     ]
     assert str(whole) in printed.out
     assert str(cut) not in printed.out
     assert main.main(["recordings", "list", "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
-    assert [bool(row["damage"]) for row in found] == [False, True, True]
-    assert [row["return"] for row in found] == [20.0, None, None]
+    rows = json.loads(capsys.readouterr().out)
+    assert [bool(row["damage"]) for row in rows] == [False, True, True]
+    assert [row["return"] for row in rows] == [20.0, None, None]
     assert main.main(["recordings", "list", str(text)]) == 1
     assert capsys.readouterr().out == ""
 
 
-def test_a_run_knows_its_files_by_their_hashes(here: Path, capsys: pytest.CaptureFixture[str]):
-    """Row ids are covered by no digest, but by the SHA-256 in the run's manifest."""
+def test_check_compares_files_with_the_manifest_of_their_run(here: Path, capsys: pytest.CaptureFixture[str]):
+    """No digest covers row ids, but the SHA-256 in the manifest of the run does."""
     file = Path(FOLDER) / "test-0000.rrd"
     content = bytearray(file.read_bytes())
     chunk = RrdReader(file).store().stream().filter(content="/episode/rewards").to_chunks()[0]
@@ -76,7 +76,7 @@ def test_a_run_knows_its_files_by_their_hashes(here: Path, capsys: pytest.Captur
     assert main.main(["recordings", "list"]) == 0
     capsys.readouterr()
     assert main.main(["recordings", "list", "--check"]) == 1
-    assert f"{file}: is not the file whose SHA-256 was kept" in capsys.readouterr().err
+    assert f"{file}: does not have the SHA-256 that was stored for it" in capsys.readouterr().err
 
 
 def test_a_recording_is_exported_as_a_film_and_a_table(here: Path, capsys: pytest.CaptureFixture[str]):
@@ -89,13 +89,11 @@ def test_a_recording_is_exported_as_a_film_and_a_table(here: Path, capsys: pytes
     assert pd.read_csv("grasp.csv")["reward"].sum() == 20.0
 
 
-def test_what_cannot_be_exported_is_one_line(
-    here: Path, complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch
-):
+def test_an_impossible_export_is_one_line(here: Path, complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch):
     words = ["recordings", "export", f"{FOLDER}/test-0000.rrd", "--quiet", "--into"]
     assert "choose from .mp4, .gif, .csv, .parquet" in complaint(*words, "grasp.avi")
     assert "no camera 'left'; choose from" in complaint(*words, "grasp.gif", "--camera", "left")
-    assert "films have an even number of pixels" in complaint(*words, "grasp.gif", "--width", "33")
+    assert "choose an even number of pixels" in complaint(*words, "grasp.gif", "--width", "33")
     assert "there is no such file" in complaint("recordings", "export", "none.rrd", "--into", "grasp.csv")
     assert "no recordings at data" in complaint("recordings", "list", "data")
     (here / "taken").write_text("")

@@ -1,4 +1,4 @@
-"""Recordings: exact, whole or not there, and honest about damage."""
+"""Recordings hold exact arrays, are written atomically, and their damage is noticed."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ PATH = reach.Path(np.zeros((5, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)))
 
 
 def episode(steps: int, seed: int = 0, **ends: Any) -> Episode:
-    """An episode of noise about the first state, but of the right shapes."""
+    """An episode of random numbers around the first state, with the right shapes."""
     rng = np.random.default_rng(seed)
     first = np.concatenate([model.half_closed(), np.zeros(23)])
     states = first + rng.normal(0.0, 0.01, (steps + 1, model.STATE))
-    how = {"terminated": False, "truncated": True, **ends}
-    return Episode(SETTING, states, rng.uniform(-1, 1, (steps, 1)), np.zeros(steps), **how)
+    ending = {"terminated": False, "truncated": True, **ends}
+    return Episode(SETTING, states, rng.uniform(-1, 1, (steps, 1)), np.zeros(steps), **ending)
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def file(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording to be damaged in copies."""
+    """An undamaged recording; tests damage copies of it."""
     file = tmp_path_factory.mktemp("whole") / "episode.rrd"
     recording.write(file, episode(20), PATH, PROPERTIES)
     return file
@@ -67,27 +67,27 @@ def test_arrays_come_back_bit_for_bit(file: Path) -> None:
     played.rewards[:2] = [-np.inf, 0.1 + 0.2]
     played.states[3, 30:33] = [-0.0, np.nan, np.inf]
     recording.write(file, played, PATH, PROPERTIES)
-    back = recording.read(file)
+    read = recording.read(file)
     for name in ("states", "actions", "rewards"):
-        was, now = getattr(played, name), getattr(back.episode, name)
-        assert was.tobytes() == now.tobytes()
-        assert (was.shape, was.dtype) == (now.shape, now.dtype)
-    assert back.episode.setting == SETTING
-    assert (back.episode.terminated, back.episode.truncated, back.episode.failure) == (False, True, "")
+        written, array = getattr(played, name), getattr(read.episode, name)
+        assert written.tobytes() == array.tobytes()
+        assert (written.shape, written.dtype) == (array.shape, array.dtype)
+    assert read.episode.setting == SETTING
+    assert (read.episode.terminated, read.episode.truncated, read.episode.failure) == (False, True, "")
 
 
 def test_properties_come_back_with_their_types(whole: Path) -> None:
-    back = recording.read(whole).properties
-    assert back == PROPERTIES
-    assert {name: type(value) for name, value in back.items()} == {n: type(v) for n, v in PROPERTIES.items()}
+    properties = recording.read(whole).properties
+    assert properties == PROPERTIES
+    assert {name: type(value) for name, value in properties.items()} == {n: type(v) for n, v in PROPERTIES.items()}
 
 
 def test_a_failed_agent_keeps_its_reason_and_scores_nothing(file: Path) -> None:
     played = episode(3, truncated=False, failure="action is nan at step 3")
     recording.write(file, played, PATH, {})
-    back = recording.read(file)
-    assert back.episode.failure == "action is nan at step 3"
-    assert back.properties == {}
+    read = recording.read(file)
+    assert read.episode.failure == "action is nan at step 3"
+    assert read.properties == {}
 
 
 def test_equal_episodes_have_equal_digests_in_unequal_files(tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ def test_equal_episodes_have_equal_digests_in_unequal_files(tmp_path: Path) -> N
     assert digest("a.rrd", 0) == digest("b.rrd", 0) != digest("c.rrd", 1)
 
 
-def test_sha256_is_that_of_the_file(file: Path) -> None:
+def test_write_returns_the_sha256_of_the_file(file: Path) -> None:
     sha256 = recording.write(file, episode(2), PATH, {})
     assert recording.read(file, sha256).episode.setting == SETTING
     with pytest.raises(recording.BrokenRecording, match="SHA-256"):
@@ -107,8 +107,8 @@ def test_sha256_is_that_of_the_file(file: Path) -> None:
 
 def test_one_flipped_byte_of_the_states_is_noticed(whole: Path, file: Path) -> None:
     content = bytearray(whole.read_bytes())
-    at = content.index(recording.read(whole).episode.states[11, 20].tobytes())
-    content[at] ^= 1
+    position = content.index(recording.read(whole).episode.states[11, 20].tobytes())
+    content[position] ^= 1
     file.write_bytes(content)
     with pytest.raises(recording.BrokenRecording, match=r"episode\.rrd: its content does not match its digest"):
         recording.read(file)
@@ -123,7 +123,7 @@ def test_a_recording_cut_anywhere_is_noticed(whole: Path, file: Path, share: flo
         recording.read(file)
 
 
-def test_what_is_no_recording_is_named(file: Path) -> None:
+def test_errors_name_a_missing_file_and_a_file_of_another_format(file: Path) -> None:
     with pytest.raises(recording.BrokenRecording, match="there is no such file"):
         recording.read(file)
     file.write_text("reach,return\n")
@@ -131,7 +131,7 @@ def test_what_is_no_recording_is_named(file: Path) -> None:
         recording.read(file)
 
 
-def test_a_recording_of_something_else_is_named(file: Path) -> None:
+def test_a_file_of_another_application_is_refused(file: Path) -> None:
     rrd_file.save(file, blueprint.line_styles(), "other", blueprint.blueprint())
     with pytest.raises(recording.BrokenRecording, match="no digest"):
         recording.read(file)
@@ -142,28 +142,29 @@ def chunks_of(file: Path) -> list[Chunk]:
 
 
 def forge(file: Path, chunks: list[Chunk]) -> None:
-    """Writes chunks with the digest that they need."""
+    """Writes chunks with their correct digest."""
     identity = episode_file.digest(episode_file.lines(chunks))
     digest = Chunk.from_property("digest", rr.AnyValues(sha256=identity))
     rrd_file.save(file, [*chunks, digest], identity, blueprint.blueprint())
 
 
-def test_states_of_uneven_length_make_no_episode(whole: Path, file: Path) -> None:
-    kept = [each for each in chunks_of(whole) if each.entity_path not in ("/__properties/digest", "/episode/states")]
+def test_states_of_uneven_length_are_refused(whole: Path, file: Path) -> None:
+    omitted = ("/__properties/digest", "/episode/states")
+    kept = [chunk for chunk in chunks_of(whole) if chunk.entity_path not in omitted]
     uneven = rr.Scalars.columns(scalars=np.zeros(7)).partition([3, 4])
     forge(file, [*kept, Chunk.from_columns("/episode/states", scene.timelines(0, 1), uneven)])
-    with pytest.raises(recording.BrokenRecording, match="holds arrays that make no episode"):
+    with pytest.raises(recording.BrokenRecording, match="holds arrays that are not those of an episode"):
         recording.read(file)
 
 
-def test_a_recording_without_a_fact_is_one_of_another_version(whole: Path, file: Path) -> None:
-    """Its digest is right, so that nobody damaged it."""
+def test_a_recording_without_a_property_is_of_another_version(whole: Path, file: Path) -> None:
+    """Its digest is correct, so it is not damaged."""
     forge(file, [chunk for chunk in chunks_of(whole) if not chunk.entity_path.startswith("/__properties")])
     with pytest.raises(recording.BrokenRecording, match="of another version of dextron-bench: it lacks 'reach'"):
         recording.read(file)
 
 
-def test_a_write_that_fails_leaves_what_was_there(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_write_keeps_the_old_file(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recording.write(file, episode(2), PATH, {})
     before = file.read_bytes()
 
@@ -182,21 +183,21 @@ import os, signal, sys
 from pathlib import Path
 from typing import Any
 sys.path.insert(0, sys.argv[1])
-from tests.recording import test_episode_file as here
+from tests.recording import test_episode_file as tests
 os.fsync = lambda file: os.kill(os.getpid(), signal.SIGKILL)
-here.recording.write(Path(sys.argv[2]), here.episode(3), here.PATH, {})
+tests.recording.write(Path(sys.argv[2]), tests.episode(3), tests.PATH, {})
 """
 
 
 @pytest.mark.slow
-def test_a_killed_writer_leaves_nothing_that_looks_whole(file: Path) -> None:
-    ended = subprocess.run([sys.executable, "-c", KILLED, str(Path(__file__).parents[2]), str(file)], check=False)
-    assert ended.returncode == -signal.SIGKILL
+def test_a_killed_writer_leaves_no_incomplete_recording(file: Path) -> None:
+    process = subprocess.run([sys.executable, "-c", KILLED, str(Path(__file__).parents[2]), str(file)], check=False)
+    assert process.returncode == -signal.SIGKILL
     assert not file.exists()
     assert list(file.parent.glob("*.rrd")) == []
 
 
-def test_a_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_an_error_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
     with pytest.raises(recording.UnwritableRecording) as caught:
         recording.write(tmp_path / "taken" / "episode.rrd", episode(2), PATH, {})
@@ -204,35 +205,37 @@ def test_a_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_leave_is_one_line(tmp_path: Path) -> None:
+@pytest.mark.skipif(os.geteuid() == 0, reason="root can write anywhere")
+def test_a_folder_without_permission_is_an_error_in_one_line(tmp_path: Path) -> None:
     tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
     with pytest.raises(recording.UnwritableRecording, match="Permission denied"):
         recording.write(tmp_path / "episode.rrd", episode(2), PATH, {})
 
 
-def test_other_layouts_are_those_of_other_applications(tmp_path: Path) -> None:
-    """The viewer has one layout an application: that of the last file it was given."""
-    files = [tmp_path / name for name in ("plain.rrd", "foretold.rrd", "pair.rrd")]
+def test_each_layout_has_its_own_application_id(tmp_path: Path) -> None:
+    """The viewer has one layout for each application id: the layout of the last file that it opened."""
+    files = [tmp_path / name for name in ("plain.rrd", "predicted.rrd", "pair.rrd")]
     recording.write(files[0], episode(2), PATH, {})
     recording.write(
         files[1], episode(2), PATH, {}, StepPredictions(GRID, np.full((2, 51), 0.5), np.zeros(2), np.zeros(2), 2.0)
     )
     recording.write_pair(files[2], *files[:2])
-    found = [RrdReader(file).recordings()[0].application_id for file in files]
-    assert found == ["dextron-bench-plain", "dextron-bench", "dextron-bench-pairs"]
+    applications = [RrdReader(file).recordings()[0].application_id for file in files]
+    assert applications == ["dextron-bench-plain", "dextron-bench", "dextron-bench-pairs"]
     assert [summary.damage for summary in recording.summarise(files, whole=True)] == ["", "", ""]
 
 
 def test_it_opens_with_its_own_layout(whole: Path) -> None:
-    """The viewer arranges a file by itself, and badly, if it is not told which blueprint to open with."""
+    """Without an active blueprint the viewer chooses a layout itself, and a bad one."""
     printed = subprocess.run(
         [sys.executable, "-m", "rerun", "rrd", "print", str(whole)], capture_output=True, text=True, check=True
     )
-    told = re.findall(r'BlueprintActivationCommand\(.*"(.+)"\), make_active: false, make_default: true', printed.stdout)
-    [layout_of] = RrdReader(whole).blueprints()
-    assert told == [layout_of.recording_id]
-    views = [str(each.entity_path) for each in RrdReader(whole).stream(store=layout_of).to_chunks()]
+    activated = re.findall(
+        r'BlueprintActivationCommand\(.*"(.+)"\), make_active: false, make_default: true', printed.stdout
+    )
+    [layout] = RrdReader(whole).blueprints()
+    assert activated == [layout.recording_id]
+    views = [str(chunk.entity_path) for chunk in RrdReader(whole).stream(store=layout).to_chunks()]
     assert sum(path.startswith("/view/") and path.count("/") == 2 for path in views) == 1 + 1 + len(blueprint.PLOTS)
 
 
@@ -243,17 +246,17 @@ def test_rerun_switched_off_is_an_error_and_not_an_empty_file(file: Path, monkey
     assert os.listdir(file.parent) == []
 
 
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted where Linux tells of them")
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only Linux lists threads in /proc")
 def test_recordings_leave_no_threads_behind(file: Path) -> None:
-    counted = []
+    counts = []
     for _ in range(3):
         recording.write(file, episode(2), PATH, {})
-        counted.append(len(os.listdir("/proc/self/task")))
-    assert counted[0] == counted[1] == counted[2]
+        counts.append(len(os.listdir("/proc/self/task")))
+    assert counts[0] == counts[1] == counts[2]
 
 
 @pytest.mark.parametrize("broken", ["states", "actions", "rewards"])
-def test_arrays_that_make_no_episode_are_refused(file: Path, broken: str) -> None:
+def test_arrays_of_the_wrong_type_are_refused(file: Path, broken: str) -> None:
     arrays = {name: getattr(episode(3), name) for name in ("states", "actions", "rewards")}
     arrays[broken] = arrays[broken].astype(np.float32)
     with pytest.raises(ValueError, match=f"{broken} of 3 steps must be float64"):
@@ -266,7 +269,7 @@ def test_a_recording_of_150_steps_stays_under_600_kb(file: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("rewards", "ends", "told"),
+    ("rewards", "ends", "outcome"),
     [
         (np.ones(20), {}, "success"),
         (np.ones(17), {}, "held too briefly"),
@@ -275,10 +278,10 @@ def test_a_recording_of_150_steps_stays_under_600_kb(file: Path) -> None:
         (np.ones(20), {"truncated": False, "failure": "action is nan"}, "agent failed"),
     ],
 )
-def test_the_outcome_is_told_in_words(rewards: np.ndarray, ends: dict[str, Any], told: str) -> None:
+def test_outcomes_in_words(rewards: np.ndarray, ends: dict[str, Any], outcome: str) -> None:
     played = episode(len(rewards), **ends)
     played.rewards[:] = rewards
-    assert blueprint.outcome(played) == told
+    assert blueprint.outcome(played) == outcome
 
 
 def test_plots_show_distance_and_height_in_metres(whole: Path) -> None:
@@ -289,6 +292,6 @@ def test_plots_show_distance_and_height_in_metres(whole: Path) -> None:
     np.testing.assert_array_equal(values[:, 1], states[:, 2])
 
 
-def test_a_missing_recording_is_not_opened(tmp_path: Path) -> None:
+def test_the_viewer_does_not_start_for_a_missing_recording(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="there is no recording"):
         recording.view([tmp_path / "none.rrd"])

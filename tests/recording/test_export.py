@@ -1,4 +1,4 @@
-"""Recordings as other files: tables hold every number exactly, under its name, and nothing is left half written."""
+"""Exports: tables hold every number exactly in a named column, and a failed export leaves no incomplete file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from dextron_bench import recording
 from dextron_bench.recording import export, film
-from dextron_bench.recording.export import UnknownEnding
+from dextron_bench.recording.export import UnknownSuffix
 from dextron_bench.recording.film import FilmStyle
 from dextron_bench.world import model
 from dextron_bench.world.rendering import renderer
@@ -28,24 +28,24 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def test_every_number_of_a_state_has_the_name_of_what_it_is():
-    compiled, names = model.load(), model.state_names()
+def test_every_number_of_a_state_has_a_name():
+    physics, names = model.load(), model.state_names()
     assert len(set(names)) == len(names) == model.STATE
-    for joint in range(compiled.njnt):
-        called = compiled.joint(joint).name
-        free = compiled.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
-        assert names[compiled.jnt_qposadr[joint]] == (f"{called}_x" if free else called)
-        assert names[25 + compiled.jnt_dofadr[joint]] == f"{called}_{'vx' if free else 'velocity'}"
+    for joint in range(physics.njnt):
+        joint_name = physics.joint(joint).name
+        free = physics.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+        assert names[physics.jnt_qposadr[joint]] == (f"{joint_name}_x" if free else joint_name)
+        assert names[25 + physics.jnt_dofadr[joint]] == f"{joint_name}_{'vx' if free else 'velocity'}"
     assert names[model.BOTTLE_QUATERNION] == ("bottle_qw", "bottle_qx", "bottle_qy", "bottle_qz")
     assert names[model.PALM_POSITION] == ("palm_x", "palm_y", "palm_z")
     assert names[25:31] == ("bottle_vx", "bottle_vy", "bottle_vz", "bottle_wx", "bottle_wy", "bottle_wz")
 
 
-@pytest.mark.parametrize("ending", [".csv", ".parquet", ".CSV"])
-def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, ending: str):
-    file = tmp_path / "new" / f"episode{ending}"
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".CSV"])
+def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, suffix: str):
+    file = tmp_path / "new" / f"episode{suffix}"
     export.export(recorded, file, FilmStyle())
-    table = pd.read_parquet(file) if ending == ".parquet" else pd.read_csv(file)
+    table = pd.read_parquet(file) if suffix == ".parquet" else pd.read_csv(file)
     played = recording.read(recorded).episode
     assert list(table.columns) == ["step", "seconds", *model.state_names(), "action", "reward"]
     assert table["step"].tolist() == [0, 1, 2, 3, 4]
@@ -56,32 +56,36 @@ def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, en
     assert os.listdir(file.parent) == [file.name]
 
 
-@pytest.mark.parametrize("ending", [".mp4", ".gif"])
-def test_a_film_is_written_by_its_ending(recorded: Path, tmp_path: Path, ending: str):
-    told, file = [], tmp_path / f"film{ending}"
-    export.export(recorded, file, FilmStyle(64, 48), lambda *parts: told.append(parts))
-    assert told[-1] == ((5, 5) if ending == ".mp4" else (3, 3))
-    assert file.read_bytes()[:12].startswith(b"GIF89a" if ending == ".gif" else b"\x00\x00\x00")
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_the_suffix_decides_the_format_of_a_film(recorded: Path, tmp_path: Path, suffix: str):
+    progress, file = [], tmp_path / f"film{suffix}"
+
+    def report(done: int, total: int, note: str = "") -> None:
+        progress.append((done, total))
+
+    export.export(recorded, file, FilmStyle(64, 48), report)
+    assert progress[-1] == ((5, 5) if suffix == ".mp4" else (3, 3))
+    assert file.read_bytes()[:12].startswith(b"GIF89a" if suffix == ".gif" else b"\x00\x00\x00")
     assert os.listdir(tmp_path) == [file.name]
 
 
-def test_an_unknown_ending_names_the_known_before_anything_is_read(tmp_path: Path):
+def test_an_unknown_suffix_lists_the_formats_before_anything_is_read(tmp_path: Path):
     for name in ("film.avi", "film"):
         with pytest.raises(
-            UnknownEnding, match=r"film.*: cannot export to .*; choose from \.mp4, \.gif, \.csv, \.parquet"
+            UnknownSuffix, match=r"film.*: cannot export to .*; choose from \.mp4, \.gif, \.csv, \.parquet"
         ):
             export.export(tmp_path / "none.rrd", tmp_path / name, FilmStyle())
 
 
-def test_what_fails_half_way_leaves_what_was_there(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_failed_export_keeps_the_old_file(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     file = tmp_path / "film.gif"
     file.write_text("before")
 
-    def full(part: Path, *_: object) -> None:
+    def fill_disk(part: Path, *_: object) -> None:
         part.write_bytes(b"GIF89a")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setitem(export.FILMS, ".gif", full)
+    monkeypatch.setitem(export.FILMS, ".gif", fill_disk)
     with pytest.raises(OSError, match="No space left"):
         export.export(recorded, file, FilmStyle())
     assert (file.read_text(), os.listdir(tmp_path)) == ("before", ["film.gif"])
@@ -95,10 +99,10 @@ def test_a_damaged_recording_is_not_exported(recorded: Path, tmp_path: Path):
     assert os.listdir(tmp_path) == ["cut.rrd"]
 
 
-def test_the_pictures_of_a_film_are_those_of_stills():
+def test_frames_of_a_film_are_close_to_stills():
     states = episode(1).states
-    with renderer.Painter(32, 24, supersampling=2) as painter:
-        expected = painter.paint(states[0], renderer.CAMERAS["side"])
+    with renderer.Renderer(32, 24, supersampling=2) as frame_renderer:
+        expected = frame_renderer.render(states[0], renderer.CAMERAS["side"])
     np.testing.assert_array_equal(renderer.frames(states, 32, 24)[0], expected)
-    coarse = next(iter(film._pictures(states, FilmStyle(32, 24))))
+    coarse = next(iter(film._frames(states, FilmStyle(32, 24))))
     assert np.abs(coarse.astype(int) - expected).mean() < 5.0

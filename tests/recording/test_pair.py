@@ -1,4 +1,4 @@
-"""Two recordings side by side hold all that each of them shows."""
+"""A pair shows everything that its two recordings show."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from dextron_bench.evaluation.replay import replay
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 
-def recorded(file: Path, place: int, speed: float, method: str) -> Path:
-    setting = SETTINGS[place]
+def recorded(file: Path, index: int, speed: float, method: str) -> Path:
+    setting = SETTINGS[index]
     ((_, episode),) = replay(SOURCE, [setting], [np.full(12, speed)], threads=1)
     recording.write(file, episode, SOURCE.path(setting), {"method": method, "seed": 0})
     return file
 
 
-def test_each_side_has_its_own_world_and_lines(tmp_path: Path):
+def test_each_side_has_a_scene_and_lines(tmp_path: Path):
     first, second = recorded(tmp_path / "1.rrd", 0, 0.5, "bc"), recorded(tmp_path / "2.rrd", 0, -0.25, "rl")
     file = recording.write_pair(tmp_path / "both.rrd", first, second)
     chunks = RrdReader(file).store().stream().to_chunks()
@@ -34,7 +34,7 @@ def test_each_side_has_its_own_world_and_lines(tmp_path: Path):
     assert {f"{side}{entity}" for side in "ab" for entity in ("/world/palm", "/card")} <= {e[1:] for e in entities}
 
 
-def test_other_settings_are_not_compared(tmp_path: Path):
+def test_different_settings_are_refused(tmp_path: Path):
     first, second = recorded(tmp_path / "1.rrd", 0, 0.5, "bc"), recorded(tmp_path / "2.rrd", 1, 0.5, "bc")
     with pytest.raises(recording.UnequalSettings, match="take two of the same row"):
         recording.write_pair(tmp_path / "both.rrd", first, second)

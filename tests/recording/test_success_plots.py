@@ -1,7 +1,8 @@
-"""What recordings show of the success model: every column bit for bit, and the picture by hand."""
+"""Predictions in recordings: every column bit for bit, and the ridge plot by hand."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -34,14 +35,14 @@ def noise(steps: int) -> tuple[Episode, StepPredictions]:
 
 @pytest.fixture(scope="module")
 def columns(tmp_path_factory: pytest.TempPathFactory) -> dict[str, pa.RecordBatch]:
-    """The changing columns of a recording of 150 steps, by entity."""
-    file = tmp_path_factory.mktemp("foreseen") / "episode.rrd"
-    episode, insight = noise(150)
-    recording.write(file, episode, SOURCE.path(SETTINGS[0]), {"method": "mine"}, insight)
+    """The columns of a recording of 150 steps that are not static, by entity."""
+    file = tmp_path_factory.mktemp("predicted") / "episode.rrd"
+    episode, predictions = noise(150)
+    recording.write(file, episode, SOURCE.path(SETTINGS[0]), {"method": "mine"}, predictions)
     assert recording.read(file).episode.actions.tobytes() == episode.actions.tobytes()
     assert file.stat().st_size < 620_000
-    found = RrdReader(file).store().stream().to_chunks()
-    return {str(chunk.entity_path): chunk.to_record_batch() for chunk in found if not chunk.is_static}
+    chunks = RrdReader(file).store().stream().to_chunks()
+    return {str(chunk.entity_path): chunk.to_record_batch() for chunk in chunks if not chunk.is_static}
 
 
 def flat(batch: pa.RecordBatch, name: str) -> np.ndarray:
@@ -53,35 +54,37 @@ def tensors(batch: pa.RecordBatch, name: str) -> np.ndarray:
 
 
 def test_curves_chances_and_actions_come_back(columns: dict[str, pa.RecordBatch]):
-    episode, insight = noise(150)
-    np.testing.assert_array_equal(tensors(columns["/success/curve"], "BarChart:values"), insight.curves.astype("f4"))
+    episode, predictions = noise(150)
+    np.testing.assert_array_equal(
+        tensors(columns["/success/curve"], "BarChart:values"), predictions.curves.astype("f4")
+    )
     chosen = columns["/success/chosen"]
-    np.testing.assert_array_equal(tensors(chosen, "BarChart:values")[:, 0], insight.chances.astype("f4"))
+    np.testing.assert_array_equal(tensors(chosen, "BarChart:values")[:, 0], predictions.chances.astype("f4"))
     np.testing.assert_array_equal(tensors(chosen, "BarChart:abscissa")[:, 0], episode.actions[:, 0].astype("f4"))
-    assert flat(columns["/signals/expert"], "Scalars:scalars").tobytes() == insight.experts.tobytes()
+    assert flat(columns["/signals/expert"], "Scalars:scalars").tobytes() == predictions.experts.tobytes()
     chances = flat(columns["/success/chance"], "Scalars:scalars").reshape(-1, 2)
-    assert chances[:, 0].tobytes() == insight.chances.tobytes()
+    assert chances[:, 0].tobytes() == predictions.chances.tobytes()
     assert set(chances[:, 1]) == {0.5}
 
 
 def test_a_changed_curve_is_noticed(tmp_path: Path):
-    """The digest covers what the model thought: the same episode with another thought is another content."""
-    episode, insight = noise(3)
-    changed = StepPredictions(GRID, insight.curves.copy(), insight.chances, insight.experts, insight.duration)
+    """The digest covers predictions: the same episode with another prediction has another digest."""
+    episode, predictions = noise(3)
+    changed = replace(predictions, curves=predictions.curves.copy())
     changed.curves[1, 7] += 0.25
-    told = []
-    for each in (insight, changed):
-        recording.write(tmp_path / "e.rrd", episode, SOURCE.path(SETTINGS[0]), {}, each)
+    digests = []
+    for written in (predictions, changed):
+        recording.write(tmp_path / "e.rrd", episode, SOURCE.path(SETTINGS[0]), {}, written)
         stream = RrdReader(tmp_path / "e.rrd").store().stream().filter(content="/__properties/digest")
-        told.append([chunk.to_record_batch().to_pydict()["sha256"] for chunk in stream.to_chunks()])
-    assert told[0] != told[1]
+        digests.append([chunk.to_record_batch().to_pydict()["sha256"] for chunk in stream.to_chunks()])
+    assert digests[0] != digests[1]
 
 
-def test_ridges_rise_step_by_step_and_are_green_where_the_outcome_is_foretold():
+def test_later_ridges_are_higher_and_correct_ones_are_green():
     curves = np.zeros((2, 3))
     curves[1] = [0.0, 1.0, 0.5]
-    seen = StepPredictions(GRID, curves, np.array([0.2, 0.9]), np.zeros(2), duration=2.0)
-    chunks = list(success_plots.ridge(seen, np.array([-1.0, 0.5]), last=1, success=True))
+    predictions = StepPredictions(GRID, curves, np.array([0.2, 0.9]), np.zeros(2), duration=2.0)
+    chunks = list(success_plots.ridge(predictions, np.array([-1.0, 0.5]), last=1, success=True))
     ridge = next(chunk for chunk in chunks if chunk.entity_path == "/ridge/curves").to_record_batch().to_pydict()
     strips, colours = ridge["LineStrips2D:strips"][0], ridge["LineStrips2D:colors"][0]
     np.testing.assert_allclose(strips[0], [[-1, 0], [0, 0], [1, 0]])
@@ -91,16 +94,16 @@ def test_ridges_rise_step_by_step_and_are_green_where_the_outcome_is_foretold():
     np.testing.assert_allclose(strips[3], [[0.5, -5.0], [0.5, -5.2]], atol=1e-6)
 
 
-def test_the_experts_actions_in_its_own_states_are_those_it_took():
+def test_expert_actions_in_the_states_of_an_experts_episode_are_its_actions():
     (_, episode), *_ = rollout(ExpertAgent(), SOURCE, [CASE], threads=1)
     np.testing.assert_array_equal(expert_actions(CASE.expert, episode.states[:-1]), episode.actions[:, 0])
 
 
-def test_contacts_are_where_the_hand_touches_the_bottle():
+def test_contacts_are_close_to_the_bottle():
     (_, episode), *_ = rollout(ExpertAgent(), SOURCE, [Case(SETTINGS[0], Expert(1.4, 0.17), 0.1)], threads=1)
-    _, _, touched = scene.poses(episode.states)
-    assert not len(touched[0])
-    points = np.concatenate(touched)
-    bottle = np.repeat(episode.states[:, :3], [len(each) for each in touched], axis=0)
+    _, _, contacts = scene.poses(episode.states)
+    assert not len(contacts[0])
+    points = np.concatenate(contacts)
+    bottle = np.repeat(episode.states[:, :3], [len(part) for part in contacts], axis=0)
     assert len(points)
     assert np.linalg.norm(points[:, :2] - bottle[:, :2], axis=1).max() < 0.15

@@ -1,4 +1,4 @@
-"""The recordings in `recordings/`: whole, small together, and played again from their own actions."""
+"""The recordings in `recordings/` are undamaged and small, and a replay of their actions gives the same returns."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ FILES = sorted(FOLDER.glob("*.rrd"))
 KINDS = {"fading", "early", "expert", "policy", "wrong"}
 
 
-def test_they_are_few_and_small():
+def test_the_shipped_recordings_are_small():
     assert sum(file.stat().st_size for file in FILES) < 10e6
     assert {f"case-{kind}" for kind in KINDS} <= {file.stem for file in FILES}
 
 
-def test_all_are_whole_and_say_whose_they_are():
+def test_the_shipped_recordings_are_undamaged_and_have_the_properties_of_their_run():
     for summary in recording.summarise(FILES, whole=True):
         assert not summary.damage, summary
-        own = summary.file.stem.startswith("sim")  # A world of minimum-jerk reaches.
-        assert summary.properties["reaches"] == ("minjerk" if own else "synthetic")
+        is_sim = summary.file.stem.startswith("sim")  # SIM plays on minimum-jerk reaches.
+        assert summary.properties["reaches"] == ("minjerk" if is_sim else "synthetic")
         assert summary.properties["physics"] == model.mjcf_hash()
         if not summary.file.stem.startswith("case-"):
             method, _, outcome = summary.file.stem.rpartition("-")
@@ -34,10 +34,10 @@ def test_all_are_whole_and_say_whose_they_are():
 
 
 @pytest.mark.parametrize("reaches", ["synthetic", "minjerk"])
-def test_their_actions_lead_to_the_same_end_again(reaches: str):
-    recorded = [recording.read(file) for file in FILES]
-    episodes = [each.episode for each in recorded if each.properties["reaches"] == reaches]
-    settings, actions = zip(*((each.setting, each.actions[:, 0]) for each in episodes), strict=True)
-    for place, again in replay(sources.open_source(reaches), settings, actions):
-        assert again.score == episodes[place].score
-        assert len(again.actions) == len(episodes[place].actions)
+def test_a_replay_of_the_shipped_recordings_gives_the_same_returns(reaches: str):
+    recordings = [recording.read(file) for file in FILES]
+    episodes = [shipped.episode for shipped in recordings if shipped.properties["reaches"] == reaches]
+    settings, actions = zip(*((episode.setting, episode.actions[:, 0]) for episode in episodes), strict=True)
+    for index, replayed in replay(sources.open_source(reaches), settings, actions):
+        assert replayed.score == episodes[index].score
+        assert len(replayed.actions) == len(episodes[index].actions)
