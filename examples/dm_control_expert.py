@@ -1,4 +1,4 @@
-"""The paper's expert in the simulated-trajectory world, through dm_control: `python examples/dm_control_expert.py`."""
+"""The paper's expert on the source `minjerk`, through dm_control: `python examples/dm_control_expert.py`."""
 
 import numpy as np
 
@@ -7,13 +7,13 @@ from dextron_bench.world import suite
 
 
 def main(episodes: int = 3) -> list[float]:
-    """Plays and prints the returns of so many episodes, and returns them."""
+    """Plays some episodes, prints their returns, and gives them back as a list."""
     env, agent = suite.load("minjerk", seed=0), ExpertAgent()
-    only = np.array([0])
-    agent.assign(only, [Expert(gain=2.0, critical=0.15)])
+    episode = np.array([0])
+    agent.assign(episode, [Expert(gain=2.0, critical=0.15)])
     returns = []
     for _ in range(episodes):
-        agent.reset(only)
+        agent.reset(episode)
         step, score = env.reset(), 0.0
         while not step.last():
             step = env.step(agent.act(step.observation["state"][None])[0])

@@ -1,4 +1,4 @@
-"""Random actions in eight episodes at once, through Gymnasium: `python examples/gymnasium_random.py`."""
+"""Random actions in eight parallel episodes, through Gymnasium: `python examples/gymnasium_random.py`."""
 
 import gymnasium
 
@@ -6,7 +6,7 @@ import dextron_bench  # noqa: F401  # Registers the environment.
 
 
 def main(reaches: str = "minjerk", steps: int = 500) -> int:
-    """Prints how each finished episode ended; returns how many there were."""
+    """Prints how each episode ends, and returns the number of finished episodes."""
     env = gymnasium.make_vec("dextron_bench/Grasp-v0", num_envs=8, reaches=reaches)
     env.action_space.seed(0)
     env.reset(seed=0)

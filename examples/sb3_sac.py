@@ -1,4 +1,4 @@
-"""SAC of Stable-Baselines3 on the benchmark: `pip install stable-baselines3`, then `python examples/sb3_sac.py`."""
+"""SAC from Stable-Baselines3: `pip install stable-baselines3`, then `python examples/sb3_sac.py`."""
 
 import gymnasium
 from stable_baselines3 import SAC
@@ -9,7 +9,7 @@ import dextron_bench  # noqa: F401  # Registers the environment.
 
 
 def main(reaches: str = "minjerk", steps: int = 20_000, episodes: int = 5) -> None:
-    """Trains for so many control steps, then prints the mean return over so many episodes."""
+    """Trains for some control steps, then prints the mean return over some episodes."""
     env = Monitor(gymnasium.make("dextron_bench/Grasp-v0", reaches=reaches))
     agent = SAC("MlpPolicy", env, learning_starts=min(1000, steps // 2), verbose=1, seed=0)
     agent.learn(steps)

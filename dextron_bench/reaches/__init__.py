@@ -1,1 +1,1 @@
-"""Reaches: hand trajectories, recorded, synthetic or simulated, and the settings made of them (paper, II.B)."""
+"""Reaches: hand trajectories, recorded, synthetic or simulated, and the settings of episodes (paper, II.B)."""

@@ -1,7 +1,7 @@
 """The task as Gymnasium environments, registered as dextron_bench/Grasp-v0.
 
-The info of every reset and step has the `setting` of the episode, its `episode_return` so far, and `is_success`, which
-is true once the return is that of a success.
+The info of every reset and step has the `setting` of the episode, its `episode_return` so far, and `is_success`. The
+last is true from the step on which the return reaches SUCCESS.
 """
 
 from __future__ import annotations

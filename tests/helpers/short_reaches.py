@@ -1,4 +1,4 @@
-"""Short made-up reaches for tests, one and a half seconds long before they lift; and episodes on a lone engine."""
+"""Short made-up reaches for tests, and reference episodes on an engine with one slot."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.setting import ReachSource, Setting
 from dextron_bench.world.engine import Engine
 
-GRASP = (-0.015, 0.005)  # [m] an offset from which the closing fingers get hold of the bottle.
-BRUSH = (0.02, 0.06)  # [m] one from which the hand knocks it over.
+GRASP = (-0.015, 0.005)  # [m] an offset at which the closing fingers grasp the bottle.
+BRUSH = (0.02, 0.06)  # [m] an offset at which the hand knocks the bottle over.
 
 
-def smooth(u: np.ndarray) -> np.ndarray:
-    """A minimum-jerk course from 0 to 1."""
+def minimum_jerk(u: np.ndarray) -> np.ndarray:
+    """A minimum-jerk profile from 0 to 1."""
     u = np.clip(u, 0.0, 1.0)
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
-def brief(name: str, start: tuple[float, float]) -> Reach:
-    """0.5 s from a start (x, y) [m] before the bottle, then 0.7 s up; all takes 3.5 s in an episode without noise."""
+def short_reach(name: str, start: tuple[float, float]) -> Reach:
+    """0.5 s from a start (x, y) [m] to the bottle, then 0.7 s up. An episode without noise takes 3.5 s."""
     times = np.arange(121) * 0.01
-    positions = np.outer(1.0 - smooth(times / 0.5), [*start, 0.0]) + np.outer(smooth((times - 0.5) / 0.7), [0, 0, 0.25])
+    approach = np.outer(1.0 - minimum_jerk(times / 0.5), [*start, 0.0])
+    positions = approach + np.outer(minimum_jerk((times - 0.5) / 0.7), [0, 0, 0.25])
     positions[:, 2] += 0.1
     return Reach(name, times, positions, np.tile(ORIENTATION, (len(times), 1)), 0.5, "made-up", 0, 3)
 
 
-SOURCE = ReachSource("brief", [brief("a", (-0.08, -0.2)), brief("b", (-0.05, -0.3))])
+SOURCE = ReachSource("brief", [short_reach("a", (-0.08, -0.2)), short_reach("b", (-0.05, -0.3))])
 SETTINGS = (
     Setting("a", *GRASP, 0.0),
     Setting("b", *GRASP, 0.5),
@@ -38,18 +39,18 @@ SETTINGS = (
     Setting("a", -0.02, 0.0, 0.7),
     Setting("a", 0.03, 0.04, 0.2),
 )
-CLOSING = (56, 76, 50, 59, 20)  # Control step from which the fingers of each setting's episode close.
+CLOSING = (56, 76, 50, 59, 20)  # Control step from which the fingers close, for each setting.
 
 
 def actions(k: int) -> np.ndarray:
-    """The actions (500, 1) that are played in SETTINGS[k]: mostly opening, then mostly closing."""
+    """Actions (500, 1) for SETTINGS[k]: first opening, then closing, with noise."""
     rng = np.random.default_rng(k)
     steps = np.arange(500)
     return (np.where(steps < CLOSING[k], -0.8, 0.8) + rng.uniform(-0.2, 0.2, 500))[:, None]
 
 
 @dataclass(frozen=True, slots=True)
-class Played:
+class PlayedEpisode:
     """An episode: states (T + 1, 48), rewards (T,), and how it ended."""
 
     states: np.ndarray
@@ -59,8 +60,8 @@ class Played:
 
 
 @cache
-def played(k: int) -> Played:
-    """The episode of SETTINGS[k] under actions(k), on an engine of one slot and one thread."""
+def played(k: int) -> PlayedEpisode:
+    """The episode of SETTINGS[k] with actions(k), on an engine with one slot and one thread."""
     engine, slot = Engine(1, threads=1), np.array([0])
     states, rewards = [engine.begin(slot, [SOURCE.path(SETTINGS[k])])[0]], []
     for action in actions(k):
@@ -68,5 +69,5 @@ def played(k: int) -> Played:
         states.append(step.states[0])
         rewards.append(step.rewards[0])
         if step.ended[0]:
-            return Played(np.array(states), np.array(rewards), bool(step.terminated[0]), bool(step.truncated[0]))
-    raise AssertionError("an episode outlasted its limit")
+            return PlayedEpisode(np.array(states), np.array(rewards), bool(step.terminated[0]), bool(step.truncated[0]))
+    raise AssertionError("an episode exceeded its limit")

@@ -1,4 +1,4 @@
-"""A release of recorded reaches in small: three made-up reaches in the same files as the authors' release."""
+"""A small release: three made-up reaches, in the same files as the authors' release."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Equal settings and actions give bit-equal episodes, wherever on whichever engine they are played."""
+"""Equal settings and actions give bit-equal episodes in every slot of every engine."""
 
 from __future__ import annotations
 
@@ -8,41 +8,41 @@ import pytest
 from dextron_bench.reaches.reach import PALM_AHEAD
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine
-from tests.helpers.short_reaches import SETTINGS, SOURCE, Played, actions, played
+from tests.helpers.short_reaches import SETTINGS, SOURCE, PlayedEpisode, actions, played
 
 
-def play(engine: Engine, queue: list[int], slots: np.ndarray) -> dict[int, Played]:
-    """Plays the settings of a queue in some slots of an engine, each slot refilled as it falls free."""
-    queue, done = list(queue), {}
-    holds: dict[int, int] = {}
+def play(engine: Engine, queue: list[int], slots: np.ndarray) -> dict[int, PlayedEpisode]:
+    """Plays the settings of a queue in some slots of an engine. Each free slot takes the next setting."""
+    queue, episodes = list(queue), {}
+    playing: dict[int, int] = {}  # Setting by slot.
     states: dict[int, list[np.ndarray]] = {}
     rewards: dict[int, list[float]] = {}
-    while queue or holds:
-        free = [slot for slot in slots.tolist() if slot not in holds][: len(queue)]
+    while queue or playing:
+        free = [slot for slot in slots.tolist() if slot not in playing][: len(queue)]
         if free:
-            holds |= {slot: queue.pop(0) for slot in free}
-            first = engine.begin(np.array(free), [SOURCE.path(SETTINGS[holds[slot]]) for slot in free])
+            playing |= {slot: queue.pop(0) for slot in free}
+            first = engine.begin(np.array(free), [SOURCE.path(SETTINGS[playing[slot]]) for slot in free])
             states |= {slot: [row] for slot, row in zip(free, first, strict=True)}
             rewards |= {slot: [] for slot in free}
-        live = np.array(list(holds))
-        step = engine.step(live, np.array([actions(holds[slot])[len(rewards[slot])] for slot in holds]))
+        live = np.array(list(playing))
+        step = engine.step(live, np.array([actions(playing[slot])[len(rewards[slot])] for slot in playing]))
         for i, slot in enumerate(live.tolist()):
             states[slot].append(step.states[i])
             rewards[slot].append(step.rewards[i])
             if step.ended[i]:
                 ends = bool(step.terminated[i]), bool(step.truncated[i])
-                done[holds.pop(slot)] = Played(np.array(states[slot]), np.array(rewards[slot]), *ends)
-    return done
+                episodes[playing.pop(slot)] = PlayedEpisode(np.array(states[slot]), np.array(rewards[slot]), *ends)
+    return episodes
 
 
-def assert_bit_equal(one: Played, other: Played) -> None:
-    """Every bit of two episodes agrees."""
+def assert_bit_equal(one: PlayedEpisode, other: PlayedEpisode) -> None:
+    """Asserts that two episodes agree in every bit."""
     assert one.states.tobytes() == other.states.tobytes()
     assert one.rewards.tobytes() == other.rewards.tobytes()
     assert (one.terminated, one.truncated) == (other.terminated, other.truncated)
 
 
-def test_the_episodes_compared_below_lift_drop_and_knock_over():
+def test_the_compared_episodes_lift_drop_and_knock_over_the_bottle():
     ends = [(played(k).rewards.sum(), played(k).terminated) for k in range(len(SETTINGS))]
     assert task.SUCCESS in [score for score, _ in ends]
     assert {terminated for _, terminated in ends} == {True, False}
@@ -53,15 +53,15 @@ def test_the_episodes_compared_below_lift_drop_and_knock_over():
     ("slots", "used", "threads"),
     [(1, [0], 1), (1, [0], 2), (7, [6, 0, 3], 1), (7, [2, 5], 2), (256, [255, 7, 128, 64, 13], 2)],
 )
-def test_slot_number_of_slots_threads_and_order_change_no_bit(slots: int, used: list[int], threads: int):
+def test_slot_thread_count_and_order_change_no_bit(slots: int, used: list[int], threads: int):
     order = [3, 2, 0, 4, 1]
-    done = play(Engine(slots, threads), order, np.array(used))
-    assert sorted(done) == sorted(order)
+    episodes = play(Engine(slots, threads), order, np.array(used))
+    assert sorted(episodes) == sorted(order)
     for k in order:
-        assert_bit_equal(done[k], played(k))
+        assert_bit_equal(episodes[k], played(k))
 
 
-def test_a_refilled_slot_keeps_nothing_of_other_episodes():
+def test_a_new_episode_does_not_depend_on_earlier_ones_in_its_slot():
     engine, slot = Engine(1, threads=1), np.array([0])
     for before in (0, 2):
         engine.begin(slot, [SOURCE.path(SETTINGS[before])])
@@ -70,22 +70,22 @@ def test_a_refilled_slot_keeps_nothing_of_other_episodes():
         assert_bit_equal(play(engine, [3], slot)[3], played(3))
 
 
-def test_a_fork_goes_on_as_its_original_would_and_leaves_it_alone():
-    engine, here, there = Engine(3, threads=2), np.array([1]), np.array([2])
-    engine.begin(there, [SOURCE.path(SETTINGS[4])])
-    engine.begin(here, [SOURCE.path(SETTINGS[3])])
+def test_a_fork_does_not_change_its_original():
+    engine, original, fork = Engine(3, threads=2), np.array([1]), np.array([2])
+    engine.begin(fork, [SOURCE.path(SETTINGS[4])])
+    engine.begin(original, [SOURCE.path(SETTINGS[3])])
     for action in actions(3)[:65]:
-        engine.step(here, action[None])
-    engine.fork(here, there)
+        engine.step(original, action[None])
+    engine.fork(original, fork)
     for action, state, reward in zip(actions(3)[65:], played(3).states[66:], played(3).rewards[65:], strict=False):
-        engine.step(there, np.array([[-1.0]]))
-        step = engine.step(here, action[None])
+        engine.step(fork, np.array([[-1.0]]))
+        step = engine.step(original, action[None])
         assert step.states[0].tobytes() == state.tobytes()
         assert step.rewards[0] == reward
-        engine.fork(here, there)
+        engine.fork(original, fork)
 
 
-def test_a_fork_taken_in_contact_replays_the_rest():
+def test_a_fork_during_contact_continues_like_its_original():
     engine, both = Engine(2, threads=2), np.array([0, 1])
     engine.begin(both[:1], [SOURCE.path(SETTINGS[3])])
     for action in actions(3)[:90]:
@@ -99,7 +99,7 @@ def test_a_fork_taken_in_contact_replays_the_rest():
     assert ended.all()
 
 
-def test_an_episode_begins_at_rest_half_closed_behind_the_carrier():
+def test_an_episode_begins_at_rest_with_the_hand_half_closed_at_the_carrier():
     path = SOURCE.path(SETTINGS[0])
     state = Engine(2, threads=1).begin(np.array([1]), [path])[0]
     np.testing.assert_array_equal(state[model.PALM_POSITION], path.positions[0] + PALM_AHEAD)

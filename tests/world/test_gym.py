@@ -1,4 +1,4 @@
-"""The Gymnasium face: registration, the contracts of single and vector environments, and bits equal to the engine's."""
+"""The Gymnasium environments: the contracts of single and vector ones, and bit-equality with the engine."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_the_registered_environment_passes_gymnasiums_checks_without_a_warning()
         env.step(env.action_space.sample())
 
 
-def test_render_gives_a_picture_that_changes_with_the_state():
+def test_the_rendered_picture_changes_with_the_state():
     env = GraspEnv(SOURCE, [SETTINGS[3]], render_mode="rgb_array")
     env.reset()
     before = env.render()
@@ -44,7 +44,7 @@ def test_render_gives_a_picture_that_changes_with_the_state():
     assert GraspEnv(SOURCE).render() is None
 
 
-def test_no_bit_differs_from_the_engine_over_whole_episodes():
+def test_whole_episodes_are_bit_equal_to_those_of_the_engine():
     env = GraspEnv(SOURCE, SETTINGS)
     for k, setting in enumerate(SETTINGS):
         state, info = env.reset()
@@ -64,7 +64,7 @@ def test_no_bit_differs_from_the_engine_over_whole_episodes():
         assert info["is_success"] == (reference.rewards.sum() == task.SUCCESS)
 
 
-def test_a_setting_can_be_asked_for():
+def test_a_reset_can_take_a_setting():
     env = GraspEnv(SOURCE, SETTINGS)
     state, info = env.reset(options={"setting": SETTINGS[4]})
     assert info["setting"] == SETTINGS[4]
@@ -72,14 +72,14 @@ def test_a_setting_can_be_asked_for():
     assert env.reset()[1]["setting"] == SETTINGS[0]
 
 
-def test_a_seed_goes_back_to_the_first_setting():
+def test_a_seed_returns_to_the_first_setting():
     env = GraspEnv(SOURCE, SETTINGS)
     env.reset(seed=1)
     assert env.reset()[1]["setting"] == SETTINGS[1]
     assert env.reset(seed=1)[1]["setting"] == SETTINGS[0]
 
 
-def test_a_step_outside_an_episode_asks_for_a_reset():
+def test_a_step_outside_an_episode_raises_reset_needed():
     env = GraspEnv(SOURCE, [SETTINGS[2]])
     with pytest.raises(ResetNeeded, match="call reset"):
         env.step(np.zeros(1))
@@ -93,7 +93,7 @@ def test_a_step_outside_an_episode_asks_for_a_reset():
 
 
 @pytest.mark.parametrize("action", [[np.nan], [np.nextafter(1.0, 2.0)], [-np.inf], [0.0, 0.0], 0.5, None])
-def test_a_bad_action_is_refused_and_changes_nothing(action: object):
+def test_an_invalid_action_is_refused_and_changes_nothing(action: object):
     env = GraspEnv(SOURCE, [SETTINGS[0]])
     env.reset()
     with pytest.raises(ActionError, match=r"actions must"):
@@ -102,7 +102,7 @@ def test_a_bad_action_is_refused_and_changes_nothing(action: object):
     assert state.tobytes() == played(0).states[1].tobytes()
 
 
-def test_a_bad_action_among_many_is_refused():
+def test_one_invalid_action_among_many_is_refused():
     env = GraspVectorEnv(3, SOURCE)
     env.reset(seed=0)
     with pytest.raises(ActionError, match=r"lie in \[-1, 1\].*got 1.5"):
@@ -111,7 +111,7 @@ def test_a_bad_action_among_many_is_refused():
         env.step(np.zeros(3))
 
 
-def test_the_vector_environment_is_made_by_name_and_says_how_it_resets():
+def test_make_vec_returns_the_vector_environment_and_its_autoreset_mode():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gymnasium.make_vec(ID, num_envs=4, reaches=SOURCE, threads=2)
@@ -126,22 +126,22 @@ def test_the_vector_environment_is_made_by_name_and_says_how_it_resets():
     assert states in env.observation_space
 
 
-def test_the_vector_environment_equals_as_many_single_ones():
+def test_the_vector_environment_agrees_with_single_ones():
     rng = np.random.default_rng(0)
-    ours, theirs = GraspVectorEnv(3, SOURCE, threads=2), SyncVectorEnv([lambda: GraspEnv(SOURCE)] * 3)
-    assert_same(ours.reset(seed=9), theirs.reset(seed=9))
-    over = 0
+    vector, singles = GraspVectorEnv(3, SOURCE, threads=2), SyncVectorEnv([lambda: GraspEnv(SOURCE)] * 3)
+    assert_same(vector.reset(seed=9), singles.reset(seed=9))
+    ended = 0
     for _ in range(130):
         commands = rng.uniform(-1.0, 1.0, (3, 1))
-        step = ours.step(commands)
-        assert_same(step, theirs.step(commands))
-        over += int((step[2] | step[3]).sum())
-    assert over >= 3  # So that slots have begun anew.
-    assert_same(ours.reset(), theirs.reset())
+        step = vector.step(commands)
+        assert_same(step, singles.step(commands))
+        ended += int((step[2] | step[3]).sum())
+    assert ended >= 3  # Slots have begun new episodes.
+    assert_same(vector.reset(), singles.reset())
 
 
 def assert_same(one: tuple, other: tuple) -> None:
-    """Arrays of two resets or steps agree bit for bit, and so do their infos."""
+    """Asserts that the arrays of two resets or steps agree in every bit, and that their infos agree."""
     for a, b in zip(one[:-1], other[:-1], strict=True):
         assert a.tobytes() == b.tobytes()
         assert a.dtype == b.dtype
@@ -151,7 +151,7 @@ def assert_same(one: tuple, other: tuple) -> None:
         assert values.dtype == other[-1][key].dtype
 
 
-def test_a_list_of_settings_is_dealt_as_slots_fall_free():
+def test_each_free_slot_takes_the_next_setting_of_the_list():
     env = GraspVectorEnv(2, SOURCE, SETTINGS[2:], threads=1)
     _, infos = env.reset()
     assert infos["setting"].tolist() == [SETTINGS[2], SETTINGS[3]]
@@ -168,7 +168,7 @@ def test_a_list_of_settings_is_dealt_as_slots_fall_free():
     assert states[1].tobytes() == played(3).states[length + 1].tobytes()
 
 
-def test_what_the_vector_environment_returned_does_not_change_later():
+def test_returned_arrays_of_the_vector_environment_do_not_change_later():
     env = GraspVectorEnv(2, SOURCE)
     states, infos = env.reset(seed=0)
     kept, returns = states.copy(), infos["episode_return"].copy()

@@ -1,4 +1,4 @@
-"""The dm_control face: the contract of an environment, and bits equal to the engine's."""
+"""The dm_control environment: the contract of an environment, and bit-equality with the engine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.helpers.short_reaches import SETTINGS, SOURCE, actions, played
 
 
 def episode(env: control.Environment, rng: np.random.Generator) -> Iterator[dm_env.TimeStep]:
-    """The time steps of one episode of random actions."""
+    """Yields the time steps of one episode with random actions."""
     step = env.reset()
     yield step
     while not step.last():
@@ -24,18 +24,18 @@ def episode(env: control.Environment, rng: np.random.Generator) -> Iterator[dm_e
         yield step
 
 
-def observed(env: control.Environment) -> np.ndarray:
-    """The states (T, 48) of one episode of the same random actions each time."""
+def episode_states(env: control.Environment) -> np.ndarray:
+    """The states (T, 48) of one episode, with the same random actions in each call."""
     return np.array([step.observation["state"] for step in episode(env, np.random.default_rng(5))])
 
 
 @pytest.fixture
 def env() -> control.Environment:
-    """An environment that draws from the made-up source."""
+    """An environment that draws settings from the short reaches."""
     return suite.load(SOURCE, seed=1)
 
 
-def test_specs_are_48_numbers_and_one_speed(env: control.Environment):
+def test_the_specs_are_48_numbers_and_one_speed(env: control.Environment):
     assert list(env.observation_spec()) == ["state"]
     assert env.observation_spec()["state"].shape == (model.STATE,)
     action = env.action_spec()
@@ -56,41 +56,41 @@ def test_every_step_of_an_episode_meets_the_specs(env: control.Environment):
     assert steps[-1].discount in (0.0, 1.0)
 
 
-def test_after_the_last_step_any_action_begins_an_episode(env: control.Environment):
+def test_a_step_after_the_last_one_begins_an_episode(env: control.Environment):
     list(episode(env, np.random.default_rng(0)))
     assert env.step(np.zeros(1)).first()
     assert env.step(np.zeros(1)).mid()
 
 
-def test_a_fresh_environment_begins_at_its_first_step():
+def test_the_first_step_of_a_new_environment_begins_an_episode():
     assert suite.load(SOURCE, seed=1).step(np.zeros(1)).first()
 
 
-def test_equal_seeds_agree_and_others_do_not():
+def test_equal_seeds_give_equal_episodes_and_other_seeds_do_not():
     one, same, other = (suite.load(SOURCE, seed=seed) for seed in (3, 3, 4))
-    assert observed(one).tobytes() == observed(same).tobytes()
+    assert episode_states(one).tobytes() == episode_states(same).tobytes()
     assert one.task.setting == same.task.setting  # pyright: ignore[reportAttributeAccessIssue]
     assert one.reset().observation["state"].tobytes() != other.reset().observation["state"].tobytes()
 
 
-def test_a_reset_leaves_nothing_behind():
+def test_an_episode_after_a_reset_does_not_depend_on_earlier_ones():
     env = suite.load(SOURCE, [SETTINGS[3]])
-    first = observed(env)
+    first = episode_states(env)
     env.reset()
     for _ in range(30):
         env.step(np.ones(1))
     env.physics.data.qfrc_applied[:] = 1.0
     env.physics.data.qacc_warmstart[:] = 9.0
-    assert observed(env).tobytes() == first.tobytes()
+    assert episode_states(env).tobytes() == first.tobytes()
 
 
-def test_a_reset_leaves_the_shared_start_pose_alone(env: control.Environment):
+def test_a_reset_does_not_change_the_shared_start_pose(env: control.Environment):
     before = model.half_closed().copy()
     env.reset()
     np.testing.assert_array_equal(model.half_closed(), before)
 
 
-def test_observing_changes_no_physics(env: control.Environment):
+def test_observation_does_not_change_the_physics(env: control.Environment):
     env.reset()
     env.step(np.ones(1))
     before = env.physics.get_state()
@@ -100,14 +100,14 @@ def test_observing_changes_no_physics(env: control.Environment):
     np.testing.assert_array_equal(env.physics.get_state(), before)
 
 
-def test_what_it_returned_does_not_change_later(env: control.Environment):
+def test_returned_states_do_not_change_later(env: control.Environment):
     step = env.reset()
     kept = step.observation["state"].copy()
     env.step(np.ones(1))
     np.testing.assert_array_equal(step.observation["state"], kept)
 
 
-def test_no_bit_differs_from_the_engine_over_whole_episodes():
+def test_whole_episodes_are_bit_equal_to_those_of_the_engine():
     env = suite.load(SOURCE, SETTINGS)
     for k, setting in enumerate(SETTINGS):
         step, reference = env.reset(), played(k)
@@ -121,13 +121,13 @@ def test_no_bit_differs_from_the_engine_over_whole_episodes():
         assert step.discount == (0.0 if reference.terminated else 1.0)
 
 
-def test_settings_are_played_over_and_over():
+def test_settings_are_played_in_turn_again_and_again():
     env = suite.load(SOURCE, SETTINGS[:2])
-    names = []
+    settings = []
     for _ in range(4):
         env.reset()
-        names.append(env.task.setting)  # pyright: ignore[reportAttributeAccessIssue]
-    assert names == [*SETTINGS[:2], *SETTINGS[:2]]
+        settings.append(env.task.setting)  # pyright: ignore[reportAttributeAccessIssue]
+    assert settings == [*SETTINGS[:2], *SETTINGS[:2]]
 
 
 @pytest.mark.parametrize("action", [[np.nan], [1.0 + 1e-15], [-2.0], [0.0, 0.0], 0.5, ["close"]])
@@ -137,7 +137,7 @@ def test_a_bad_action_is_refused(env: control.Environment, action: object):
         env.step(action)
 
 
-def test_bad_arguments_are_answered_with_the_good_ones():
+def test_errors_for_invalid_arguments_list_the_valid_ones():
     with pytest.raises(UnknownSource, match="choose from minjerk, real, synthetic"):
         suite.load("sintetic")
     with pytest.raises(ValueError, match="empty list"):

@@ -1,4 +1,4 @@
-"""The task's measurements, commands, reward and endings, with numbers done by hand."""
+"""Measurements, commands, rewards and ends of the task, with numbers calculated by hand."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ def states(n: int = 1) -> np.ndarray:
     return np.tile(np.concatenate([model.half_closed(), np.zeros(23)]), (n, 1))
 
 
-def seen(bottle: list[float], hand: list[float] | None = None) -> np.ndarray:
-    """States of one episode over time, as (T, 1, 48), from the heights [m] of bottle and hand."""
+def trajectory(bottle: list[float], hand: list[float] | None = None) -> np.ndarray:
+    """States (T, 1, 48) of one episode with these heights [m] of bottle and hand."""
     rows = states(len(bottle))
     rows[:, 2] = bottle
     rows[:, 9] = hand if hand is not None else 0.2
     return rows[:, None]
 
 
-def course(heights: np.ndarray, poses: int = 10_000) -> tuple[list[float], int, bool, bool]:
-    """Rewards up to the end, the step at which it came (0: never), and whether terminated or truncated."""
+def play(trajectory: np.ndarray, poses: int = 10_000) -> tuple[list[float], int, bool, bool]:
+    """Rewards until the end, the step of the end (0 if there is none), and whether it terminated or truncated."""
     progress, ids = task.Progress.empty(1), np.array([0])
     progress.begin(ids, states(), np.array([poses]))
     rewards = []
-    for k, state in enumerate(heights, start=1):
+    for k, state in enumerate(trajectory, start=1):
         reward, terminated, truncated = progress.advance(ids, state)
         rewards.append(float(reward[0]))
         if terminated[0] or truncated[0]:
@@ -38,7 +38,7 @@ def course(heights: np.ndarray, poses: int = 10_000) -> tuple[list[float], int, 
     return rewards, 0, False, False
 
 
-def test_every_digit_starts_half_closed_and_the_thumb_opposed():
+def test_every_digit_starts_half_closed_with_the_thumb_opposed():
     angles = {
         "thumb_base": 1.05,
         "thumb_proximal": -0.285,
@@ -46,11 +46,11 @@ def test_every_digit_starts_half_closed_and_the_thumb_opposed():
         **{f"{finger}_{part}": 0.785 for finger in model.DIGITS[1:] for part in ("proximal", "distal")},
     }
     qpos = model.half_closed()
-    found = {name: float(qpos[model.load().joint(name).qposadr[0]]) for name in angles}
-    assert found == pytest.approx(angles)
+    measured = {name: float(qpos[model.load().joint(name).qposadr[0]]) for name in angles}
+    assert measured == pytest.approx(angles)
 
 
-def test_palm_centre_turns_with_the_palm():
+def test_the_palm_centre_rotates_with_the_palm():
     rows = states(2)
     rows[:, 7:10] = 1.0, 2.0, 3.0
     rows[0, 10:14] = 1.0, 0.0, 0.0, 0.0
@@ -58,11 +58,11 @@ def test_palm_centre_turns_with_the_palm():
     np.testing.assert_allclose(task.palm_centre(rows), [[1.0, 2.09, 3.03], [0.91, 2.0, 3.03]])
 
 
-def test_palm_centre_is_where_the_model_has_its_site():
+def test_the_palm_centre_agrees_with_the_site_of_the_model():
     np.testing.assert_array_equal(model.load().site("palm_centre").pos, task.PALM_CENTRE)
 
 
-def test_distance_is_level_and_to_the_bottles_axis():
+def test_the_distance_is_horizontal_and_to_the_bottles_axis():
     rows = states()
     rows[0, 7:10] = 0.3, 0.31, 5.0  # Palm centre at (0.3, 0.4).
     rows[0, :3] = 0.0, 0.0, 0.125
@@ -72,24 +72,24 @@ def test_distance_is_level_and_to_the_bottles_axis():
 
 
 @pytest.mark.parametrize(("digit", "angle"), [("thumb", -0.57 * 0.8), ("index", 1.256), ("little", 1.256)])
-def test_closure_is_that_of_the_most_closed_digit(digit: str, angle: float):
+def test_the_most_closed_digit_determines_the_closure(digit: str, angle: float):
     rows = states()
     rows[0, model.load().joint(f"{digit}_proximal").qposadr[0]] = angle
     assert task.closure(rows)[0] == pytest.approx(0.8)
 
 
-def test_closure_leaves_out_the_thumbs_base_and_the_distal_joints():
+def test_the_closure_ignores_the_thumbs_base_and_the_distal_joints():
     rows = states()
     for name in ("thumb_base", "index_distal"):
         rows[0, model.load().joint(name).qposadr[0]] = 1.5
     assert task.closure(rows)[0] == pytest.approx(0.5)
 
 
-def test_commands_hold_the_thumbs_base_and_slow_the_thumb_by_its_range():
-    found = task.commands(np.array([[1.0], [-0.5], [0.0]]))
+def test_commands_hold_the_thumbs_base_and_scale_the_thumbs_speed_by_its_range():
+    controls = task.commands(np.array([[1.0], [-0.5], [0.0]]))
     thumb = 0.57 / 1.57
     expected = [[1.05, thumb, 1, 1, 1, 1], [1.05, -thumb / 2, -0.5, -0.5, -0.5, -0.5], [1.05, 0, 0, 0, 0, 0]]
-    np.testing.assert_allclose(found, expected)
+    np.testing.assert_allclose(controls, expected)
 
 
 @pytest.mark.parametrize(("action", "sign"), [(1.0, 1.0), (-1.0, -1.0)])
@@ -102,57 +102,57 @@ def test_a_positive_action_closes_every_digit_and_a_negative_one_opens_it(action
         engine.step(slot, np.array([[action]]))
     after = engine.states(slot)[0, joints] / closed
     assert (sign * (after - before) > 0.1).all()
-    assert np.ptp(after) < 0.1  # Digits of different range close at one pace.
+    assert np.ptp(after) < 0.1  # Digits with different ranges take the same time.
 
 
-def test_the_countdown_begins_unpaid_and_pays_twenty_steps():
-    rewards, end, terminated, truncated = course(seen([0.125] * 5 + [0.25] * 30))
+def test_the_first_step_of_the_countdown_earns_nothing_and_twenty_steps_earn_one():
+    rewards, end, terminated, truncated = play(trajectory([0.125] * 5 + [0.25] * 30))
     assert rewards == [0.0] * 6 + [1.0] * 20
     assert (end, terminated, truncated) == (26, False, True)
     assert sum(rewards) == task.SUCCESS
 
 
-def test_only_steps_with_the_bottle_lifted_are_paid():
-    rewards, end, *_ = course(seen([0.25] + [0.3, 0.2499] * 15))
+def test_only_steps_with_the_bottle_lifted_earn_a_reward():
+    rewards, end, *_ = play(trajectory([0.25] + [0.3, 0.2499] * 15))
     assert sum(rewards) == 10.0
     assert end == 21
 
 
 def test_a_raised_hand_starts_the_countdown_too():
     below, above = np.nextafter(0.2 + 0.145, 0.0), 0.2 + 0.145
-    assert course(seen([0.125] * 40, [below] * 40))[1] == 0
-    rewards, end, _, truncated = course(seen([0.125] * 40, [0.2] * 3 + [above] + [0.2] * 36))
+    assert play(trajectory([0.125] * 40, [below] * 40))[1] == 0
+    rewards, end, _, truncated = play(trajectory([0.125] * 40, [0.2] * 3 + [above] + [0.2] * 36))
     assert (sum(rewards), end, truncated) == (0.0, 24, True)
 
 
-def test_the_countdown_runs_once():
-    rewards, end, *_ = course(seen([0.25] + [0.2] * 10 + [0.25] * 30))
+def test_the_countdown_runs_only_once():
+    rewards, end, *_ = play(trajectory([0.25] + [0.2] * 10 + [0.25] * 30))
     assert (sum(rewards), end) == (10.0, 21)
 
 
 def test_a_fallen_bottle_terminates():
-    assert course(seen([0.125, 0.110, 0.1099]))[1:] == (3, True, False)
+    assert play(trajectory([0.125, 0.110, 0.1099]))[1:] == (3, True, False)
 
 
-def test_a_fall_at_the_last_moment_is_a_fall_and_not_a_timeout():
-    rewards, *ends = course(seen([0.25] + [0.26] * 19 + [0.1]))
-    assert ends == [21, True, False]
+def test_a_fall_at_the_last_step_terminates_and_does_not_truncate():
+    rewards, *end = play(trajectory([0.25] + [0.26] * 19 + [0.1]))
+    assert end == [21, True, False]
     assert sum(rewards) == 19.0
 
 
 def test_the_last_pose_is_held_for_twenty_steps():
-    assert course(seen([0.125] * 600), poses=101)[1:] == (120, False, True)
+    assert play(trajectory([0.125] * 600), poses=101)[1:] == (120, False, True)
 
 
 @pytest.mark.parametrize("poses", [482, 501, 10_000])
-def test_no_episode_outlasts_ten_seconds(poses: int):
-    assert course(seen([0.125] * 600), poses)[1:] == (500, False, True)
+def test_no_episode_is_longer_than_ten_seconds(poses: int):
+    assert play(trajectory([0.125] * 600), poses)[1:] == (500, False, True)
 
 
-def test_episodes_do_not_mix():
+def test_the_progress_of_episodes_is_independent():
     progress, ids = task.Progress.empty(3), np.array([2, 0])
     progress.begin(ids, states(2), np.array([5, 50]))
-    rows = seen([0.25, 0.125])[:, 0]
+    rows = trajectory([0.25, 0.125])[:, 0]
     progress.advance(ids, rows)
     reward, _, _ = progress.advance(ids, rows)
     assert reward.tolist() == [1.0, 0.0]

@@ -24,7 +24,7 @@ class FetchError(RuntimeError):
 
     def __init__(self, url: str, reason: object) -> None:
         super().__init__(
-            f"cannot download {url}: {reason}; download it where there is a network, "
+            f"cannot download {url}: {reason}; download it on a machine with a network connection, "
             "then run `dextron-bench data import --from <zip>`"
         )
 

@@ -34,7 +34,7 @@ class ReleaseError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Manifest:
-    """The published files: the SHA-256 of each, by its name from `extracts/` on, and that of the manifest itself."""
+    """The published files: the SHA-256 of each, by its name from `extracts/` on, and of the manifest itself."""
 
     files: dict[str, str]
     digest: str

@@ -2,7 +2,7 @@
 
 An AUC of 0.5 means that a classifier guesses, 1 that it is always right (classifier two-sample test; Lopez-Paz and
 Oquab, 2017). No classifier scores a reach that it was trained on. The test needs scikit-learn, from the `dev` extra:
-its result depends on the classifiers, and those of scikit-learn are well known.
+its result depends on the classifiers, and the classifiers of scikit-learn are well known.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def study(
     """All tables of the two-sample test, by name.
 
     `nearest` is about the shipped reaches. All other tables are about models that were not fitted to the recorded
-    reaches beside them. Calls `progress` with the numbers of steps done and in all. Raises MissingClassifiers before it
-    computes anything.
+    reaches in the comparison. Calls `progress` with the numbers of steps done and in all. Raises MissingClassifiers
+    before it computes anything.
     """
     fits = (len(GROUPS) + 1) * len(classifiers(seed))
     total, done = FOLDS + fits + SUBJECT_FOLDS * (1 + 2 * fits), itertools.count(1)

@@ -1,4 +1,4 @@
-"""Pictures: they show the state, and dressing the model changes nothing that a score depends on."""
+"""Pictures show the state, and the visual model differs from the physics model in nothing that scores depend on."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ def orange(picture: np.ndarray) -> int:
 
 
 @pytest.mark.parametrize("name", SIZES + BODIES + JOINTS + ACTUATORS)
-def test_dressing_keeps_every_quantity_of_the_physics(name: str) -> None:
+def test_the_visual_model_keeps_every_quantity_of_the_physics(name: str) -> None:
     np.testing.assert_array_equal(getattr(visuals.visual_model(), name), getattr(model.load(), name))
 
 
-def test_only_the_physics_own_shapes_can_touch() -> None:
-    def touchable(compiled: mujoco.MjModel) -> list[str]:
-        able = np.flatnonzero(compiled.geom_contype | compiled.geom_conaffinity)
-        return [compiled.geom(geom).name for geom in able]
+def test_only_the_shapes_of_the_physics_model_can_collide() -> None:
+    def colliding(compiled: mujoco.MjModel) -> list[str]:
+        geoms = np.flatnonzero(compiled.geom_contype | compiled.geom_conaffinity)
+        return [compiled.geom(geom).name for geom in geoms]
 
-    assert touchable(visuals.visual_model()) == touchable(model.load())
+    assert colliding(visuals.visual_model()) == colliding(model.load())
 
 
-def test_the_dressed_model_moves_like_the_physics() -> None:
+def test_the_visual_model_moves_like_the_physics_model() -> None:
     ends = []
     for compiled in (model.load(), visuals.visual_model()):
         data = mujoco.MjData(compiled)
@@ -58,7 +58,7 @@ def test_the_dressed_model_moves_like_the_physics() -> None:
     np.testing.assert_array_equal(*ends)
 
 
-def test_a_picture_shows_the_bottle_where_it_stands(start: np.ndarray) -> None:
+def test_a_picture_shows_the_bottle_at_its_position(start: np.ndarray) -> None:
     away = start.copy()
     away[model.BOTTLE_POSITION] = 9.0
     both = renderer.frames(np.stack([start, away]), 160, 120)
@@ -68,28 +68,28 @@ def test_a_picture_shows_the_bottle_where_it_stands(start: np.ndarray) -> None:
     assert orange(both[1]) == 0
 
 
-def test_the_sky_is_up(start: np.ndarray) -> None:
+def test_the_sky_is_at_the_top(start: np.ndarray) -> None:
     picture = renderer.render(start, 80, 60).astype(int)
     assert picture[:5].mean() > picture[-5:].mean() + 20
 
 
-def test_a_picture_is_of_its_state_alone(start: np.ndarray) -> None:
+def test_a_picture_depends_only_on_its_state(start: np.ndarray) -> None:
     lifted = start.copy()
     lifted[2] += 0.2
-    once = renderer.frames(np.stack([lifted, start, lifted]), 80, 60)
-    np.testing.assert_array_equal(once[0], once[2])
-    assert (once[0] != once[1]).any()
+    pictures = renderer.frames(np.stack([lifted, start, lifted]), 80, 60)
+    np.testing.assert_array_equal(pictures[0], pictures[2])
+    assert (pictures[0] != pictures[1]).any()
 
 
 @pytest.mark.slow
-def test_more_lamps_soften_shadows(start: np.ndarray) -> None:
-    hard, soft = (renderer.render(start, 160, 120, "top", lamps).astype(int) for lamps in (1, 6))
+def test_more_lights_soften_shadows(start: np.ndarray) -> None:
+    hard, soft = (renderer.render(start, 160, 120, "top", lights).astype(int) for lights in (1, 6))
     steps = [np.abs(np.diff(picture.sum(axis=2), axis=0)).max() for picture in (hard, soft)]
     assert (hard != soft).any()
     assert steps[1] <= steps[0]
 
 
-def test_unknown_cameras_name_the_known(start: np.ndarray) -> None:
+def test_the_error_for_an_unknown_camera_lists_the_cameras(start: np.ndarray) -> None:
     with pytest.raises(
         renderer.UnknownCamera, match="no camera 'left'; choose from behind, front, hand, hero, side, top"
     ):
@@ -107,17 +107,17 @@ def test_without_graphics_the_error_says_what_to_install(start: np.ndarray, monk
 
 
 @pytest.mark.parametrize("domes", [(0.0, 0.0), (0.01, 0.02)])
-def test_shells_are_closed_and_face_outward(domes: tuple[float, float]) -> None:
-    shell = loft([Section(0.0, 0.02, 0.01), Section(0.05, 0.03, 0.02, 0.01)], domes=domes)
-    edges = Counter((int(a), int(b)) for face in shell.faces for a, b in zip(face, np.roll(face, -1), strict=True))
+def test_meshes_are_closed_and_face_outward(domes: tuple[float, float]) -> None:
+    mesh = loft([Section(0.0, 0.02, 0.01), Section(0.05, 0.03, 0.02, 0.01)], domes=domes)
+    edges = Counter((int(a), int(b)) for face in mesh.faces for a, b in zip(face, np.roll(face, -1), strict=True))
     assert all(count == 1 and edges[b, a] == 1 for (a, b), count in edges.items())
-    a, b, c = np.moveaxis(shell.vertices[shell.faces], 1, 0)
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     assert (a * np.cross(b, c)).sum() / 6 > 0
 
 
-def test_a_shell_of_equal_circles_holds_the_volume_of_its_prism() -> None:
-    shell = loft([Section(0.0, 1.0, 1.0), Section(2.0, 1.0, 1.0)], sides=24)
-    a, b, c = np.moveaxis(shell.vertices[shell.faces], 1, 0)
+def test_a_mesh_of_equal_circles_has_the_volume_of_its_prism() -> None:
+    mesh = loft([Section(0.0, 1.0, 1.0), Section(2.0, 1.0, 1.0)], sides=24)
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     assert (a * np.cross(b, c)).sum() / 6 == pytest.approx(2.0 * 12.0 * np.sin(2 * np.pi / 24))
 
 
@@ -125,7 +125,7 @@ def test_the_pictured_grasp_succeeds() -> None:
     assert stills.play_lift().success
 
 
-def test_a_pictured_hand_is_as_closed_as_told(start: np.ndarray) -> None:
+def test_a_pictured_hand_has_the_given_closure(start: np.ndarray) -> None:
     joints, closed = model.proximal()
     np.testing.assert_allclose(stills.hand_alone(start, 0.25)[joints], closed / 4)
     np.testing.assert_array_equal(stills.hand_alone(start, model.HALF_CLOSED)[14:], start[14:])
