@@ -46,16 +46,18 @@ class Check:
         from dextron_bench.methods.isolation.isolated_agent import Limits
         from dextron_bench.methods.isolation.launch import prepare_launch
 
-        how = prepare_launch(self.agent, entry.settle(self.agent, self.settings, self.reaches), self.weights)
+        launch = prepare_launch(
+            self.agent, entry.settings_from_json(self.agent, self.settings, self.reaches), self.weights
+        )
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
         results = []
-        for check in conformance.checks(how, self.reaches, limits, self.threads):
+        for check in conformance.checks(launch, self.reaches, limits, self.threads):
             results.append(check)
             if not self.json:
-                print(f"{check.verdict:4}  {check.what}: {check.found}", flush=True)
+                print(f"{check.verdict:4}  {check.what}: {check.detail}", flush=True)
         failed = [check for check in results if check.verdict == conformance.MEND]
         if self.json:
-            print_json([{"what": check.what, "verdict": check.verdict, "found": check.found} for check in results])
+            print_json([{"what": check.what, "verdict": check.verdict, "found": check.detail} for check in results])
         else:
             ready = f"ready: dextron-bench submit {shlex.quote(self.agent)} --name NAME"
             print(f"{len(failed)} to fix" if failed else ready)

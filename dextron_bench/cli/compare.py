@@ -27,8 +27,8 @@ SHOWN = 5  # How many settings are listed that more seeds of B solve, and that f
 class Compare:
     """Compare two methods on equal settings: how much more B scores than A, with its 95 % interval.
 
-    A and B are names on the leaderboard, found in --runs or else in leaderboard/results. They can also be paths: a
-    result.json, the folder of a run, or the folder of a method's runs. docs/statistics.md explains the numbers.
+    A and B are names on the leaderboard, found in --runs or else among the published results. They can also be paths:
+    a result.json, the folder of a run, or the folder of a method's runs. docs/statistics.md explains the numbers.
 
     Example: dextron-bench compare rlil-0.1-quick rlil-0.1 --reaches real --into difference.png
 

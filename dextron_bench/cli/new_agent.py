@@ -23,7 +23,7 @@ class NewAgent:
     def __call__(self) -> int:
         from dextron_bench.leaderboard.submission import starter
 
-        for file in starter.begin(self.folder):
+        for file in starter.copy_template(self.folder):
             print(file)
         print(f"try it:    dextron-bench check {self.folder}/agent.py:MyAgent")
         print(f"score it:  dextron-bench run --method {self.folder}/agent.py:MyAgent")

@@ -69,8 +69,8 @@ class Submit:
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
         with progress_bar(entry.name, self.quiet) as progress:
-            folder = playing.compete(entry, self.runs, self.record, limits, self.threads, progress)
-        playing.finish(entry, folder, file)
+            folder = playing.play_entry(entry, self.runs, self.record, limits, self.threads, progress)
+        playing.write_bundle(entry, folder, file)
         print_rows(self._standings(folder), as_json=False)
         failures = playing.failures(folder, entry.seeds)
         for why, count in failures.items():
@@ -84,7 +84,7 @@ class Submit:
         from dextron_bench.leaderboard.submission import entry as submission_entry
 
         seeds = tuple(dict.fromkeys(self.seed))
-        settings = submission_entry.settle(self.agent, self.settings, self.reaches)
+        settings = submission_entry.settings_from_json(self.agent, self.settings, self.reaches)
         return submission_entry.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared)
 
     def _standings(self, folder: Path) -> pd.DataFrame:

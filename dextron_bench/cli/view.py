@@ -91,10 +91,10 @@ class View:
 
     def _places(self) -> list[Path]:
         """The places of recordings; a submission is unpacked in the folder of runs."""
-        from dextron_bench.leaderboard.submission.unpacking import opened
+        from dextron_bench.leaderboard.submission.unpacking import unpack_for_viewing
 
         places = self.place or (self.runs,)
-        return [opened(place, self.runs) if place.suffix == ".zip" else place for place in places]
+        return [unpack_for_viewing(place, self.runs) if place.suffix == ".zip" else place for place in places]
 
     def _recordings(self, places: Sequence[Path], wanted: EpisodeFilter) -> list[Path]:
         from dextron_bench.runs import selection
@@ -154,7 +154,7 @@ class View:
         if not self.print:
             _print_episodes(table)
         if len(table) < matching and wanted.worst is None and wanted.best is None:
-            line = f"{matching} episodes match, these are the first {len(table)}; --worst {matching} selects all"
+            line = f"{matching} episodes pass the filter; these are the first {len(table)}, --worst {matching} selects all"
             print(f"dextron-bench: {line}", file=sys.stderr)
         return files
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from dextron_bench.cli import main
+from dextron_bench.runs import result_files
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import load_split
 
@@ -34,6 +35,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write(tmp_path / "runs", "good", np.where(rows < 2, 0.0, 20.0))
     write(tmp_path / "runs", "bad", np.where((rows >= 1) & (rows <= 20), 0.0, 20.0))
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(result_files, "published_results", lambda: tmp_path / "published")
     return tmp_path
 
 
@@ -110,8 +112,8 @@ def test_the_printed_text_has_rows_and_numbers(here: Path, capsys: pytest.Captur
 
 
 def test_published_results_are_used_if_there_is_no_run(compared: Callable[..., dict[str, Any]], here: Path):
-    write(here / "leaderboard/results", "good", [0.0] * ROWS)
-    write(here / "leaderboard/results", "published", [20.0] * ROWS)
+    write(here / "published", "good", [0.0] * ROWS)
+    write(here / "published", "published", [20.0] * ROWS)
     assert compared("good", "published")["return"]["mean"] == pytest.approx(0.08)
 
 
@@ -156,7 +158,7 @@ def test_an_impossible_comparison_is_one_line_on_stderr(here: Path, complaint: C
         write(here / "runs", folder, [0.0])
         write(here / "runs", folder, [0.0], reaches="synthetic")
     expected = {
-        ("good", "godo"): "no result of 'godo'; runs and leaderboard/results have bad, both, elsewhere, good",
+        ("good", "godo"): "no result of 'godo': runs has bad, both, elsewhere, good",
         ("good", "no/where"): "no result of 'no/where'",
         ("good", "older"): "played different versions of test of real reaches",
         ("good", "short"): "played different versions of test of real reaches",

@@ -1,4 +1,4 @@
-"""`dextron-bench data` as a user meets it: results on stdout, one line on stderr, exit codes."""
+"""`dextron-bench data` in a process: results on stdout, one line on stderr, exit codes."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from dextron_bench.reaches.recorded import release
 release.SHIPPED = Path(sys.argv.pop(1))
 from dextron_bench.cli.main import main
 sys.exit(main())
-"""  # The command line, checking against another manifest than the shipped one.
+"""  # The command line with another manifest instead of the shipped one.
 
 
-def run(small_release: SmallRelease, *words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs the command line in a process of its own, with an empty cache unless told otherwise."""
+def run(small_release: SmallRelease, *arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs the command line in a separate process, by default with an empty cache."""
     inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
     cache = {"DEXTRON_CACHE": str(small_release.folder / "cache")}
-    command = [sys.executable, "-c", INJECT, str(small_release.manifest), *map(str, words)]
+    command = [sys.executable, "-c", INJECT, str(small_release.manifest), *map(str, arguments)]
     return subprocess.run(
         command, env={**inherited, **cache, **environment}, capture_output=True, text=True, timeout=120
     )
@@ -77,30 +77,30 @@ DAMAGE = {
 }
 
 
-QUICK = ("truncated", "value")  # The rest wait for `make check`: each starts a process.
+QUICK = ("truncated", "value")  # The others are slow, since each starts a process.
 
 
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=[] if k in QUICK else pytest.mark.slow) for k in DAMAGE])
-def test_damage_is_one_line_with_file_and_place(small_release: SmallRelease, kind: str):
+def test_damage_is_one_line_with_file_and_position(small_release: SmallRelease, kind: str):
     file, damage, expected = DAMAGE[kind]
-    where = small_release.zip({file: damage(small_release.files[file])})
-    assert expected in complaint(run(small_release, "data", "import", "--from", where))
+    damaged = small_release.zip({file: damage(small_release.files[file])})
+    assert expected in complaint(run(small_release, "data", "import", "--from", damaged))
     assert not (small_release.folder / "cache").exists()
 
 
-def test_info_without_reaches_says_how_to_get_them(small_release: SmallRelease):
+def test_info_without_reaches_explains_how_to_get_them(small_release: SmallRelease):
     line = complaint(run(small_release, "data", "info"))
     assert "data import --from" in line
     assert "data fetch" in line
 
 
-def test_info_reads_what_the_environment_names(small_release: SmallRelease):
+def test_info_reads_the_release_in_the_environment_variable(small_release: SmallRelease):
     done = run(small_release, "data", "info", DEXTRON_DATA=str(small_release.zip()))
     assert (done.returncode, done.stderr) == (0, "")
     assert "3 real reaches by subject" in done.stdout
 
 
-def test_fetch_without_network_names_the_other_way(small_release: SmallRelease):
+def test_fetch_without_network_suggests_an_import(small_release: SmallRelease):
     line = complaint(run(small_release, "data", "fetch", https_proxy="http://127.0.0.1:9", no_proxy=""))
     assert "cannot download https://github.com/" in line
     assert "data import --from" in line
@@ -113,7 +113,7 @@ def test_a_cache_that_cannot_be_made_is_one_line(small_release: SmallRelease):
     assert blocked in line
 
 
-def test_debug_shows_where(monkeypatch: pytest.MonkeyPatch):
+def test_debug_raises_the_error(monkeypatch: pytest.MonkeyPatch):
     with pytest.raises(FileNotFoundError):
         main.main(["data", "import", "--debug", "--from", "/none"])
     monkeypatch.setenv("DEXTRON_DEBUG", "1")
@@ -122,18 +122,18 @@ def test_debug_shows_where(monkeypatch: pytest.MonkeyPatch):
 
 
 @pytest.mark.parametrize(
-    "words", [["nosuch"], ["data", "nosuch"], ["data", "info", "--nosuch"], ["data", "import"], []]
+    "arguments", [["nosuch"], ["data", "nosuch"], ["data", "info", "--nosuch"], ["data", "import"], []]
 )
-def test_wrong_usage_is_code_2(words: list[str], capsys: pytest.CaptureFixture[str]):
+def test_wrong_usage_is_code_2(arguments: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:
-        main.main(words)
+        main.main(arguments)
     assert caught.value.code == 2
     assert capsys.readouterr().out == ""
 
 
-def test_every_verb_has_an_example(capsys: pytest.CaptureFixture[str]):
-    for name, verb in main.COMMANDS.items():
-        for inner in [[part] for part in verb[1]] if isinstance(verb, tuple) else [[]]:
+def test_every_command_has_an_example(capsys: pytest.CaptureFixture[str]):
+    for name, command in main.COMMANDS.items():
+        for inner in [[member] for member in command[1]] if isinstance(command, tuple) else [[]]:
             with pytest.raises(SystemExit) as caught:
                 main.main([name, *inner, "--help"])
             assert caught.value.code == 0
@@ -141,12 +141,12 @@ def test_every_verb_has_an_example(capsys: pytest.CaptureFixture[str]):
 
 
 def test_help_imports_nothing_heavy():
-    script = "import sys; from dextron_bench import cli; cli._union(cli.COMMANDS); print(*sys.modules)"
+    script = "import sys; from dextron_bench.cli import main; main._union(main.COMMANDS); print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert not {"torch", "mujoco", "scipy", "pandas", "matplotlib", "rerun", "pyarrow"} & set(loaded)
 
 
-def test_a_reader_that_stops_early_is_no_error(small_release: SmallRelease):
+def test_a_pipe_that_closes_early_is_no_error(small_release: SmallRelease):
     run(small_release, "data", "import", "--from", small_release.zip())
     command = [sys.executable, "-c", INJECT, str(small_release.manifest), "data", "info"]
     environment = {**os.environ, "DEXTRON_CACHE": str(small_release.folder / "cache")}
@@ -168,7 +168,7 @@ def test_a_reader_that_stops_early_is_no_error(small_release: SmallRelease):
         (TypeError("two\nlines"), 70, "unexpected TypeError: two lines"),
     ],
 )
-def test_every_end_has_its_code(
+def test_every_error_has_its_exit_code(
     error: BaseException,
     code: int,
     line: str,
@@ -184,7 +184,7 @@ def test_every_end_has_its_code(
     assert capsys.readouterr().err.startswith(f"dextron-bench: {line}")
 
 
-def test_picture_of_a_source(small_release: SmallRelease, tmp_path: Path):
+def test_a_source_is_drawn(small_release: SmallRelease, tmp_path: Path):
     from dextron_bench.reaches.setting import ReachSource
     from dextron_bench.scores.figures import UnknownFormat, reach_paths
 

@@ -1,4 +1,4 @@
-"""The command line from end to end: whatever goes wrong is one line and a code, and results are for programs."""
+"""The command line from end to end: each error is one line and an exit code, and results are machine-readable."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ HEAVY = {"mujoco", "torch", "pandas", "scipy", "matplotlib", "rerun", "pyarrow",
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty working folder, with tiny splits of short reaches as the shipped ones."""
+    """An empty working folder, with tiny splits of short reaches instead of the shipped splits."""
     tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("DEXTRON_DATA", raising=False)
@@ -47,7 +47,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def mine(folder: Path, spoil: str) -> str:
-    """A method whose agent sends zeros, spoiled by a statement."""
+    """A method whose agent sends zeros, except for what the statement `spoil` changes."""
     (folder / "mine.py").write_text(AGENT.format(spoil=spoil))
     return "mine.py:Mine"
 
@@ -56,7 +56,7 @@ def run(method: str, *words: str) -> list[str]:
     return ["run", "--method", method, "--split", "test", "--no-floors", "--quiet", "--record", "0", *words]
 
 
-def test_results_are_json_and_nothing_else(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_stdout_holds_json_and_nothing_else(here: Path, capsys: pytest.CaptureFixture[str]):
     assert main.main([*run("exp", "--json"), "--record", "1"]) == 0
     printed = capsys.readouterr()
     (row,) = json.loads(printed.out)
@@ -67,7 +67,7 @@ def test_results_are_json_and_nothing_else(here: Path, capsys: pytest.CaptureFix
     assert json.loads(capsys.readouterr().out) == [row]
 
 
-def test_a_run_says_where_its_files_are(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_run_prints_the_folder_of_its_files(here: Path, capsys: pytest.CaptureFixture[str]):
     assert main.main(["run", "--method", "nothing", "--split", "open", "--quiet"]) == 0
     printed = capsys.readouterr().out
     assert "runs/nothing/synthetic/seed0" in printed
@@ -78,7 +78,7 @@ def test_a_run_says_where_its_files_are(here: Path, capsys: pytest.CaptureFixtur
     assert "unseen-reach" in printed
 
 
-def test_an_agent_that_fails_now_and_then_is_code_3_and_the_rest_is_scored(
+def test_an_agent_that_fails_in_some_episodes_is_code_3_and_other_episodes_count(
     here: Path, capsys: pytest.CaptureFixture[str]
 ):
     for spoil, failure in (("actions[0] = np.nan", "action is nan"), ("actions[0] = 1.001", "is outside [-1, 1]")):
@@ -121,12 +121,14 @@ def test_an_agent_that_cannot_begin_is_one_line(here: Path, complaint: Callable[
         (["data", "info", "--reaches", "real"], "data import --from"),
         (["mc", "--share", "2/2", "--reaches", "synthetic"], "share 2/2 does not exist"),
         (["mc", "--seed", "-1"], "a seed of 0 or more"),
-        (["view"], "there is no runs"),
-        (["view", "nowhere"], "there is no nowhere"),
+        (["view"], "runs does not exist"),
+        (["view", "nowhere"], "nowhere does not exist"),
         (["splits", "--reaches", "synthetic", "--database", "no.parquet", "--into", "new"], "no.json"),
     ],
 )
-def test_what_is_not_there_is_one_line(here: Path, complaint: Callable[..., str], words: list[str], expected: str):
+def test_missing_files_and_names_are_one_line(
+    here: Path, complaint: Callable[..., str], words: list[str], expected: str
+):
     assert expected in complaint(*words)
     assert sorted(os.listdir(here)) == ["data"]
 
@@ -134,7 +136,7 @@ def test_what_is_not_there_is_one_line(here: Path, complaint: Callable[..., str]
 @pytest.mark.parametrize(
     "words", [["nosuch"], ["run", "--reaches", "nosuch"], ["run", "--seed", "x"], ["view", "--row", "x"]]
 )
-def test_wrong_words_are_code_2(words: list[str], capsys: pytest.CaptureFixture[str]):
+def test_wrong_arguments_are_code_2(words: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:
         main.main(words)
     assert caught.value.code == 2
@@ -158,10 +160,10 @@ def test_a_file_where_the_folder_should_be_is_one_line(here: Path, complaint: Ca
     assert (here / "runs").read_text() == ""
 
 
-def test_a_full_disk_is_one_line_and_leaves_nothing_half(
+def test_a_full_disk_is_one_line_and_leaves_no_partial_file(
     here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]
 ):
-    write_whole = atomic.write_atomically
+    write_atomically = atomic.write_atomically
 
     def full(file: Path, write: Callable[[Path], object]) -> None:
         def fill(part: Path) -> None:
@@ -169,7 +171,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_half(
             part.write_bytes(part.read_bytes()[:50])
             raise OSError(28, "No space left on device", str(file))
 
-        write_whole(file, fill if file.name == "episodes.parquet" else write)
+        write_atomically(file, fill if file.name == "episodes.parquet" else write)
 
     monkeypatch.setattr(atomic, "write_atomically", full)
     line = complaint(*run("nothing"))
@@ -178,7 +180,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_half(
 
 
 @pytest.mark.parametrize("name", ["episodes.parquet", "result.json", "config.json"])
-def test_a_damaged_run_is_one_line_that_names_the_file(
+def test_a_damaged_run_is_one_line_with_the_file(
     here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str], name: str
 ):
     words = ["run", "--method", "nothing", "--split", "open", "--no-floors", "--quiet"]
@@ -200,7 +202,7 @@ def test_a_damaged_split_is_one_line(here: Path, complaint: Callable[..., str]):
     assert "reinstall the package" in complaint("list")
 
 
-def test_a_leaderboard_without_results_says_how_to_make_some(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_leaderboard_without_results_explains_how_to_make_some(here: Path, capsys: pytest.CaptureFixture[str]):
     assert main.main(["leaderboard", "show"]) == 0
     assert "dextron-bench run" in capsys.readouterr().out
     assert main.main(["leaderboard", "show", "--json"]) == 0
@@ -215,19 +217,19 @@ def test_a_search_prints_json(here: Path, monkeypatch: pytest.MonkeyPatch, capsy
     )
     monkeypatch.setattr(montecarlo, "run", lambda *_, **__: draws)
     assert main.main(["mc", "--json", "--quiet"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (found["kept"], found["solved"]) == (1, 1)
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["kept"], summary["solved"]) == (1, 1)
 
 
-def test_the_commands_own_process_has_the_codes(here: Path):
-    """What the tests above see of `main` is what a shell sees."""
+def test_a_process_has_the_same_exit_codes(here: Path):
+    """A shell sees what the tests above see of `main`."""
     process = tiny_benchmark.start(here / "data", *run("nosuch"))
     out, err = process.communicate(timeout=120)
     assert (process.returncode, out, err.count("\n")) == (2, "", 1)
     assert err.startswith("dextron-bench: no method 'nosuch'; choose from ")
 
 
-def test_interrupted_a_run_is_code_130_and_goes_on_later(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_an_interrupted_run_is_code_130_and_continues_later(here: Path, capsys: pytest.CaptureFixture[str]):
     spoil = "import time; open('started', 'w').close(); time.sleep(0.05)"
     words = run(mine(here, spoil))
     process = tiny_benchmark.start(here / "data", *words)
@@ -254,7 +256,7 @@ def test_help_and_the_package_itself_import_nothing_heavy():
     assert not HEAVY & set(loaded.split())
 
 
-def test_products_of_numpy_take_one_thread_unless_it_is_said_otherwise():
+def test_products_of_numpy_use_one_thread_by_default():
     script = (
         "from dextron_bench.cli.main import main; main(['--version']); import numpy, threadpoolctl; "
         "print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
@@ -269,7 +271,7 @@ def test_products_of_numpy_take_one_thread_unless_it_is_said_otherwise():
 
 @pytest.mark.parametrize("order", ["dextron_bench, gymnasium", "gymnasium, dextron_bench"])
 def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
-    find = "import importlib.util; importlib.util.find_spec('gymnasium')"  # Looking is not importing.
+    find = "import importlib.util; importlib.util.find_spec('gymnasium')"  # This must not import it.
     script = f"import {order.split(',')[0]}; {find}; import {order}; print(gymnasium.spec('dextron_bench/Grasp-v0').id)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("dextron_bench/Grasp-v0\n", "")
@@ -296,7 +298,7 @@ def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
         ["success", "explain"],
     ],
 )
-def test_help_of_a_verb_has_an_example(words: list[str], capsys: pytest.CaptureFixture[str]):
+def test_help_of_a_command_has_an_example(words: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as caught:
         main.main([*words, "--help"])
     assert caught.value.code == 0

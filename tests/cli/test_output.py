@@ -1,4 +1,4 @@
-"""Progress on stderr: what a bar shows, and when there is none."""
+"""Progress on stderr: what a bar shows, and when no bar appears."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dextron_bench.cli import output
 
 
 class Terminal:
-    """Stands in for a terminal on stderr."""
+    """Replaces a terminal on stderr."""
 
     def __init__(self) -> None:
         self.text = ""
@@ -33,7 +33,7 @@ def test_a_bar_shows_count_rate_and_time_left(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("NO_COLOR", "1")
     with output.progress_bar("rows") as progress:
-        progress(100, 400)  # What an earlier run did says nothing of the rate.
+        progress(100, 400)  # Work of an earlier run must not count for the rate.
         for done in (110, 120, 130):
             time.sleep(0.1)
             progress(done, 400)
@@ -44,7 +44,9 @@ def test_a_bar_shows_count_rate_and_time_left(monkeypatch: pytest.MonkeyPatch):
     assert "left" in last
 
 
-def test_a_bar_is_silent_off_a_terminal_and_when_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+def test_no_bar_appears_without_a_terminal_or_when_quiet(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
     with output.progress_bar("rows") as progress:
         progress(1, 2)
     terminal = Terminal()

@@ -1,4 +1,4 @@
-"""Methods that train, from the command line: flags, files, weights, and one line for whatever goes wrong."""
+"""Methods with training, from the command line: flags, files, weights, and one line for each error."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pytest
 from safetensors.numpy import save_file
 
 from dextron_bench.cli import main
-from dextron_bench.cli.method_flags import in_a_line
+from dextron_bench.cli.method_flags import one_line
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 from tests.helpers import tiny_benchmark, tiny_training, toy_learner
@@ -50,15 +50,15 @@ def rows(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
-def test_a_run_trains_all_seeds_together_and_says_so(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_run_trains_all_seeds_together(here: Path, capsys: pytest.CaptureFixture[str]):
     (row,) = rows(capsys, *run(TOY, "--seed", "0", "1", "--rate", "0.3"))
     assert (row["method"], row["seeds"], row["episodes"]) == ("toy-0.3", 2, 4)
     base = here / "runs" / "toy-0.3" / "synthetic"
-    assert sorted(each.name for each in base.iterdir()) == ["seed0", "seed1", "training-0+1"]
+    assert sorted(path.name for path in base.iterdir()) == ["seed0", "seed1", "training-0+1"]
     result = json.loads((base / "seed1" / "result.json").read_text())
-    told = result["training"]
-    assert (told["seeds"], told["epochs"], told["best_epoch"], told["frames"]) == ([0, 1], 2, 2, 40)
-    assert told["sha256"] == hashing.sha256(base / "seed1" / "weights.safetensors")
+    training = result["training"]
+    assert (training["seeds"], training["epochs"], training["best_epoch"], training["frames"]) == ([0, 1], 2, 2, 40)
+    assert training["sha256"] == hashing.sha256(base / "seed1" / "weights.safetensors")
     assert [point["epoch"] for point in json.loads((base / "seed1" / "curve.json").read_text())["points"]] == [2]
     assert main.main(["list"]) == 0
     assert "toy-0.3" in capsys.readouterr().out
@@ -70,28 +70,28 @@ def test_seeds_that_are_trained_are_not_trained_again(here: Path, capsys: pytest
     (row,) = rows(capsys, *run(TOY, "--seed", "0", "1", "2"))
     assert row["seeds"] == 3
     base = here / "runs" / "toy-0.1" / "synthetic"
-    assert sorted(each.name for each in base.glob("training-*")) == ["training-0+2", "training-1"]
+    assert sorted(path.name for path in base.glob("training-*")) == ["training-0+2", "training-1"]
     assert tiny_training.contents(base / "seed1") == before
 
 
-def test_an_heir_acts_with_what_its_teacher_learned_at_home(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_policy_transfer_acts_with_the_weights_of_its_source_policy(here: Path, capsys: pytest.CaptureFixture[str]):
     (row,) = rows(capsys, *run(HEIR))
-    assert (row["method"], row["reaches"]) == ("toy-heir", "synthetic")
-    source_policy = here / "runs" / "homely-0.1" / "minjerk" / "seed0"
-    heir = here / "runs" / "toy-heir" / "synthetic" / "seed0"
+    assert (row["method"], row["reaches"]) == ("toy-transfer", "synthetic")
+    source_policy = here / "runs" / "minjerk-toy-0.1" / "minjerk" / "seed0"
+    heir = here / "runs" / "toy-transfer" / "synthetic" / "seed0"
     assert (source_policy / "weights.safetensors").read_bytes() == (heir / "weights.safetensors").read_bytes()
-    assert json.loads((heir / "result.json").read_text())["training"]["label"] == "homely-0.1"
-    found = rows(capsys, *run(HOMELY), "--floors")
-    assert {row["method"]: row["reaches"] for row in found} == dict.fromkeys(
-        ("homely-0.1", "nothing", "random"), "minjerk"
+    assert json.loads((heir / "result.json").read_text())["training"]["label"] == "minjerk-toy-0.1"
+    table = rows(capsys, *run(HOMELY), "--floors")
+    assert {row["method"]: row["reaches"] for row in table} == dict.fromkeys(
+        ("minjerk-toy-0.1", "nothing", "random"), "minjerk"
     )
     arrays = tensors.read(source_policy / "weights.safetensors")
-    tensors.write(source_policy / "weights.safetensors", arrays, {"label": "homely-0.1", "seed": 1})
+    tensors.write(source_policy / "weights.safetensors", arrays, {"label": "minjerk-toy-0.1", "seed": 1})
     assert main.main(run(HEIR)) == 2
     assert "holds a run with other weights" in capsys.readouterr().err
 
 
-def test_a_dry_run_says_what_is_left_and_writes_nothing(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_dry_run_prints_what_is_left_and_writes_nothing(here: Path, capsys: pytest.CaptureFixture[str]):
     words = [*run(TOY, "--seed", "0", "1"), "--dry-run"]
     train, play = rows(capsys, *words)
     assert (train["what"], train["left"], train["seeds"]) == ("train", "2 of 2 epochs", [0, 1])
@@ -137,7 +137,7 @@ def test_flags_of_a_method_are_in_the_help(here: Path, capsys: pytest.CaptureFix
         (["--device", "cuda"], "this machine has no CUDA device"),
     ],
 )
-def test_what_goes_wrong_is_one_line(
+def test_an_error_is_one_line(
     here: Path, complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch, words: list[str], expected: str
 ):
     absent = SimpleNamespace(cuda=SimpleNamespace(is_available=lambda: False))
@@ -146,7 +146,7 @@ def test_what_goes_wrong_is_one_line(
     assert not list(here.rglob("result.json"))
 
 
-FRAMED = """╭─ Value error ────────╮
+BOX = """╭─ Value error ────────╮
 │ Error parsing --rate: │
 │ not a float: 'x'.     │
 │ ───────────────────── │
@@ -156,14 +156,12 @@ FRAMED = """╭─ Value error ────────╮
 │ For full helptext, see│
 ╰──────────────────────╯
 """
-ASCII = (
-    re.sub("[╭╰╮╯]", " ", FRAMED).replace("│", " ").replace("─", "-").replace("- Value error --", "Value error\n --")
-)
+ASCII = re.sub("[╭╰╮╯]", " ", BOX).replace("│", " ").replace("─", "-").replace("- Value error --", "Value error\n --")
 
 
-@pytest.mark.parametrize("framed", [FRAMED, ASCII])
-def test_frames_are_told_in_a_line(framed: str):
-    assert in_a_line(framed) == "Error parsing --rate: not a float: 'x'"
+@pytest.mark.parametrize("box", [BOX, ASCII])
+def test_a_box_becomes_one_line(box: str):
+    assert one_line(box) == "Error parsing --rate: not a float: 'x'"
 
 
 ODD = """
@@ -179,7 +177,7 @@ class Odd:
 @pytest.mark.parametrize(
     ("field", "expected"),
     [
-        ("seed: int = 0", "has a setting 'seed', which is a flag of 'run' itself"),
+        ("seed: int = 0", "has a setting 'seed', but 'run' already has a flag of this name"),
         ("size: int", "method 'odd.py:Odd': "),
         ("label: str = '../up'", "has the label '../up'"),
         ("size: int = 1\n    def __post_init__(self): raise KeyError('oh')", "method 'odd.py:Odd': 'oh'"),
@@ -197,7 +195,7 @@ def test_weights_of_a_file_give_the_row_of_its_run(here: Path, capsys: pytest.Ca
     file = here / "runs" / "toy-0.1" / "synthetic" / "seed4" / "weights.safetensors"
     assert rows(capsys, *evaluate("--weights", str(file))) == trained
     assert (here / "runs" / "eval" / "toy-0.1" / "synthetic" / "seed4" / "result.json").exists()
-    assert len(rows(capsys, "leaderboard", "show")) == 1  # Evaluations of weights are not counted again.
+    assert len(rows(capsys, "leaderboard", "show")) == 1  # Evaluations of weights do not count.
 
 
 def test_weights_that_ship_lie_beside_the_method(
@@ -216,13 +214,13 @@ def test_weights_that_ship_lie_beside_the_method(
         place.write_bytes((here / f"runs/toy-0.1/synthetic/seed{seed}/weights.safetensors").read_bytes())
     assert rows(capsys, *words) == trained
     assert "ship for seed 1; train them" in complaint(*words, "--seed", "0", "1")
-    assert "--rate 0.2 --reaches synthetic --seed 0`, or take what ships: toy-0.1" in complaint(*words, "--rate", "0.2")
+    assert "--rate 0.2 --reaches synthetic --seed 0`, or use weights that ship: toy-0.1" in complaint(*words, "--rate", "0.2")
 
 
 def damaged(folder: Path, kind: str) -> Path:
-    """A file of weights that is none."""
+    """A broken file of weights."""
     file, good = folder / f"{kind}.safetensors", {"map": np.zeros(SHAPE), "offset": np.zeros(())}
-    made: dict[str, Callable[[], object]] = {
+    writers: dict[str, Callable[[], object]] = {
         "missing": lambda: None,
         "empty": lambda: file.write_bytes(b""),
         "pickle": lambda: file.write_bytes(pickle.dumps(good)),
@@ -235,7 +233,7 @@ def damaged(folder: Path, kind: str) -> Path:
         "other": lambda: tensors.write(file, good, {"label": "bc"}),
         "folder": file.mkdir,
     }
-    made[kind]()
+    writers[kind]()
     return file
 
 
@@ -255,12 +253,12 @@ def damaged(folder: Path, kind: str) -> Path:
         ("folder", "folder.safetensors"),
     ],
 )
-def test_files_that_are_no_weights_are_one_line(here: Path, complaint: Callable[..., str], kind: str, expected: str):
+def test_a_broken_file_of_weights_is_one_line(here: Path, complaint: Callable[..., str], kind: str, expected: str):
     assert expected in complaint(*evaluate("--weights", damaged(here, kind).name))
     assert not (here / "runs").exists()
 
 
-def test_what_cannot_be_evaluated_is_one_line(here: Path, complaint: Callable[..., str]):
+def test_an_impossible_evaluation_is_one_line(here: Path, complaint: Callable[..., str]):
     assert "method 'exp' has no weights" in complaint("eval", "--method", "exp")
     file = damaged(here, "other").name
     assert "method 'exp' has no weights" in complaint("eval", "--method", "exp", "--weights", file)

@@ -27,7 +27,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     tiny_benchmark.forget()
 
 
-def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_data_set_with_policies_and_a_model_trained_on_it(here: Path, capsys: pytest.CaptureFixture[str]):
     run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
     assert main.main(run) == 0
     words = ["--policies", "runs/bc-smoke/synthetic/seed0/weights.safetensors", "--rows", "1500", "--quiet"]
@@ -45,7 +45,7 @@ def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.C
     assert main.main(["success", "eval", "--split", "test", *words[:2], "--json"]) == 0
     experts, policy = json.loads(capsys.readouterr().out)
     assert (experts["split"], experts["player"], policy["player"]) == ("test", "experts", words[1])
-    assert 0.0 < experts["base_rate"] < 1.0  # Those of the rows succeed, those drawn do not.
+    assert 0.0 < experts["base_rate"] < 1.0  # The experts of the rows succeed, randomly drawn ones do not.
     assert sum(experts["predictions"]) == experts["rows"]
     assert len(experts["auc_by_time"]) == 11
     assert main.main(["success", "eval", "--split", "test"]) == 0
@@ -54,21 +54,21 @@ def test_a_data_set_with_policies_and_a_model_of_it(here: Path, capsys: pytest.C
     assert (here / "pictures" / "fig5.png").exists()
 
 
-def test_what_cannot_be_is_one_line(here: Path, complaint: Callable[..., str]):
+def test_an_error_is_one_line(here: Path, complaint: Callable[..., str]):
     assert "make one with `dextron-bench success data`" in complaint("success", "train", "--quiet")
     assert "No such file" in complaint("success", "data", "--policies", "none.safetensors")
-    assert "--rows and --settings are" in complaint("figures", "--settings", "0")
-    assert "--rows is how many transitions" in complaint("success", "data", "--rows", "0")
+    assert "--rows and --settings must be 1 or more" in complaint("figures", "--settings", "0")
+    assert "--rows is the number of transitions" in complaint("success", "data", "--rows", "0")
     tensors.write(here / "odd.safetensors", {"a": np.zeros(2)}, {})
     assert "does not say which method's weights" in complaint("success", "data", "--policies", "odd.safetensors")
 
 
-def test_wrong_words_point_to_the_help_of_their_own_verb(capsys: pytest.CaptureFixture[str]):
-    for words, verb in (
+def test_wrong_arguments_point_to_the_help_of_their_command(capsys: pytest.CaptureFixture[str]):
+    for arguments, command in (
         (["success", "data", "--nope"], "success data"),
         (["success", "nope"], "success"),
         (["nope"], ""),
     ):
         with pytest.raises(SystemExit):
-            main.main(words)
-        assert capsys.readouterr().err.endswith(f"see `{f'dextron-bench {verb}'.strip()} --help`\n")
+            main.main(arguments)
+        assert capsys.readouterr().err.endswith(f"see `{f'dextron-bench {command}'.strip()} --help`\n")

@@ -1,4 +1,4 @@
-"""`dextron-bench view` from the command line: the right recordings are opened, and made where they are missing."""
+"""`dextron-bench view`: opens the right recordings, and makes those that are missing."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What the viewer, which needs a screen, was given."""
-    found: list[str] = []
+    """The files that the viewer receives; the viewer itself would need a screen."""
+    shown: list[str] = []
 
     def view(files: Sequence[Path]) -> None:
         assert all(file.is_file() for file in files)
-        found.extend(str(file) for file in files)
+        shown.extend(str(file) for file in files)
 
     monkeypatch.setattr(recording, "view", view)
-    return found
+    return shown
 
 
-def test_without_a_wish_what_is_there_is_opened(here: Path, opened: list[str]):
+def test_without_a_filter_all_existing_recordings_are_opened(here: Path, opened: list[str]):
     assert main.main(["view"]) == 0
     assert main.main(["view", "runs/exp/synthetic/seed0"]) == 0
     assert main.main(["view", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]) == 0
@@ -51,7 +51,7 @@ def test_without_a_wish_what_is_there_is_opened(here: Path, opened: list[str]):
     assert not (here / NOTHING / "recordings").exists()
 
 
-def test_the_worst_and_the_best_are_opened_together_and_told(
+def test_the_worst_and_the_best_are_opened_together_and_listed(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
 ):
     capsys.readouterr()
@@ -60,13 +60,13 @@ def test_the_worst_and_the_best_are_opened_together_and_told(
     printed = capsys.readouterr()
     assert [word in printed.out for word in ("nothing", "exp", "solved", "return")] == [True] * 4
     assert printed.err == ""
-    made = recording.read(here / opened[0])
-    assert made.properties["method"] == "nothing"
+    recorded = recording.read(here / opened[0])
+    assert recorded.properties["method"] == "nothing"
     row = pd.read_parquet(here / NOTHING / "episodes.parquet").iloc[0]
-    assert (made.episode.score, len(made.episode.actions)) == (row["score"], row["length"])
+    assert (recorded.episode.score, len(recorded.episode.actions)) == (row["score"], row["length"])
 
 
-def test_files_are_printed_for_other_programs(here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]):
+def test_print_lists_the_files(here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
     words = ["--failed", "--print", "--method", "nothing", "--split", "test", "--reaches", "synthetic", "--seed", "0"]
     assert main.main(["view", ".", *words]) == 0
@@ -77,7 +77,7 @@ def test_files_are_printed_for_other_programs(here: Path, opened: list[str], cap
     assert [line.split("/")[1] for line in capsys.readouterr().out.splitlines()] == ["exp", "nothing"]
 
 
-def test_what_is_damaged_is_named_and_the_rest_is_opened(
+def test_damaged_recordings_are_listed_and_the_others_are_opened(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
 ):
     assert main.main(["view", "--quiet", "--split", "test"]) == 0
@@ -90,31 +90,32 @@ def test_what_is_damaged_is_named_and_the_rest_is_opened(
     assert main.main(["view", "runs"]) == 1
     assert opened == others
     assert capsys.readouterr().err == (
-        f"dextron-bench: {first}: is not the file whose SHA-256 was kept; it was damaged or changed after writing\n"
+        f"dextron-bench: {first}: does not have the SHA-256 that was stored for it; "
+        "it was damaged or changed after writing\n"
     )
 
 
-def test_where_more_match_it_says_how_to_have_them(
+def test_a_line_explains_how_to_select_all_matching_episodes(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
     from dextron_bench.runs import selection
 
     monkeypatch.setattr(selection, "LIMIT", 1)
     assert main.main(["view", "--split", "test"]) == 0
-    assert "4 episodes are as asked for, these are the first 1; --worst 4 takes all" in capsys.readouterr().err
+    assert "4 episodes pass the filter; these are the first 1, --worst 4 selects all" in capsys.readouterr().err
     assert len(opened) == 1
 
 
-def test_what_cannot_be_opened_is_one_line(here: Path, opened: list[str], complaint: Callable[..., str]):
+def test_an_error_is_one_line(here: Path, opened: list[str], complaint: Callable[..., str]):
     assert "no recordings at data" in complaint("view", "data")
-    assert "there is no nowhere" in complaint("view", "nowhere")
+    assert "nowhere does not exist" in complaint("view", "nowhere")
     assert "is no .rrd file" in complaint("view", NOTHING + "/episodes.parquet")
-    assert "no runs at data to pick episodes from" in complaint("view", "data", "--failed")
-    assert "there are exp, nothing" in complaint("view", "--method", "bc")
-    assert "pick 1 episode or more" in complaint("view", "--worst", "0")
-    assert "of 4 episodes 0 are as asked for" in complaint("view", "--failed", "--method", "exp")
+    assert "no runs at data to select episodes from" in complaint("view", "data", "--failed")
+    assert "choose from exp, nothing" in complaint("view", "--method", "bc")
+    assert "select 1 episode or more" in complaint("view", "--worst", "0")
+    assert "0 of 4 episodes pass the filter" in complaint("view", "--failed", "--method", "exp")
     file = "runs/exp/synthetic/seed0/recordings/test-0000.rrd"
-    assert "is a file: episodes are picked from runs" in complaint("view", file, "--worst", "1")
+    assert "is a file, and episodes are selected from runs" in complaint("view", file, "--worst", "1")
     table = here / NOTHING / "episodes.parquet"
     pd.read_parquet(table).drop(columns="actions").to_parquet(table)
     assert "its actions were not kept; remove" in complaint("view", "--method", "nothing", "--quiet")
@@ -123,7 +124,7 @@ def test_what_cannot_be_opened_is_one_line(here: Path, opened: list[str], compla
     assert opened == []
 
 
-def test_two_runs_are_put_side_by_side_on_a_row_that_only_one_solves(here: Path, opened: list[str]):
+def test_two_runs_appear_side_by_side_on_a_row_that_only_one_solves(here: Path, opened: list[str]):
     assert main.main(["view", "--diff", "runs/exp", NOTHING]) == 0
     assert opened == ["runs/pairs/exp-0--nothing-0--test-0000.rrd"]
     assert main.main(["view", "--diff", "runs/exp", NOTHING, "--row", "1"]) == 0
@@ -133,12 +134,12 @@ def test_two_runs_are_put_side_by_side_on_a_row_that_only_one_solves(here: Path,
     assert len(opened) == 3
 
 
-def test_what_cannot_be_side_by_side_is_one_line(here: Path, complaint: Callable[..., str]):
+def test_an_impossible_pair_is_one_line(here: Path, complaint: Callable[..., str]):
     assert "--diff takes two places" in complaint("view", "--diff", "runs/exp")
     assert "no episode has row 7" in complaint("view", "--diff", "runs/exp", NOTHING, "--row", "7")
 
 
-def test_a_policy_at_work_is_watched(
+def test_a_policy_plays_live(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
 ):
     @contextmanager
@@ -152,7 +153,9 @@ def test_a_policy_at_work_is_watched(
     assert capsys.readouterr().out == "nothing on row 1 of test: 0 of 20\n"
     assert (here / "live.rrd").stat().st_size > 100_000
     assert "takes one --method" in complaint("view", "--live")
-    assert "--speed -1: it plays so many times" in complaint("view", "--live", "--method", "exp", "--speed", "-1")
+    assert "--speed must be a multiple of real time, or 0 for no delay, not -1" in complaint(
+        "view", "--live", "--method", "exp", "--speed", "-1"
+    )
     assert "has rows 0 to 1, not 9" in complaint("view", "--live", "--method", "nothing", "--row", "9")
     assert "no weights of 'rl' ship for synthetic reaches and seed 7" in complaint(
         "view", "--live", "--method", "rl", "--seed", "7"

@@ -1,4 +1,4 @@
-"""Whole trainings from the command line: the paper's table at once, and a learner that is killed again and again."""
+"""Whole trainings from the command line: the paper's table in one run, and a learner that is killed repeatedly."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[st
     monkeypatch.setitem(schedule.SCHEDULES, "smoke", schedule.Schedule(epochs=2, warm_start=60, period=1))
     words = ["run", "--all", "--preset", "smoke", *FAST, "--json"]
     assert main.main(words) == 0
-    found = {row["method"]: row for row in json.loads(capsys.readouterr().out)}
+    table = {row["method"]: row for row in json.loads(capsys.readouterr().out)}
     trained = {"bc-smoke", "rl-smoke", "rlil-0.1-smoke", "rlil-0.3-smoke", "sim-0.1-smoke", "sor-smoke"}
-    assert found.keys() == {"exp", "nothing", "random"} | trained
-    assert found["exp"]["return"] == 20.0
-    assert {name: row["reaches"] for name, row in found.items() if row["reaches"] != "synthetic"} == {
+    assert table.keys() == {"exp", "nothing", "random"} | trained
+    assert table["exp"]["return"] == 20.0
+    assert {name: row["reaches"] for name, row in table.items() if row["reaches"] != "synthetic"} == {
         "sim-0.1-smoke": "minjerk"
     }
     of = {
@@ -49,7 +49,7 @@ def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[st
     }
     assert len({file.read_bytes() for file in of.values()}) == 1
     assert main.main([*words, "--dry-run"]) == 0
-    assert json.loads(capsys.readouterr().out) == []  # All is done.
+    assert json.loads(capsys.readouterr().out) == []  # Nothing is left.
 
 
 @pytest.mark.slow
@@ -61,7 +61,7 @@ def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[st
     ],
     ids=["toy", "rlil"],
 )
-def test_killed_again_and_again_it_ends_as_an_unbroken_run(here: Path, words: list[str], latest: float):
+def test_a_run_that_is_killed_repeatedly_ends_like_an_uninterrupted_one(here: Path, words: list[str], latest: float):
 
     def start(folder: str) -> Any:
         return tiny_benchmark.start(here / "data", "run", *words, *FAST, "--no-floors", "--runs", folder)
@@ -83,6 +83,6 @@ def test_killed_again_and_again_it_ends_as_an_unbroken_run(here: Path, words: li
     process = start("broken")
     _, err = process.communicate(timeout=300)
     assert (process.returncode, err) == (0, "")
-    assert kills >= 2  # The others ended before their time came.
+    assert kills >= 2  # The others ended before they were killed.
     whole, broken = tiny_training.contents(here / "whole"), tiny_training.contents(here / "broken")
     assert whole == {name: content for name, content in broken.items() if not re.search(r"\.part$", name)}

@@ -1,4 +1,4 @@
-"""The leaderboard's page in a browser, from disk: what it shows is the table's, whatever methods are called."""
+"""The leaderboard's page in a browser: it shows the numbers of the table, for any names of methods."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.helpers.browser import visit
 
 BOARD = Path(__file__).parents[3] / "leaderboard"
 PUBLISHED = (BOARD / leaderboard_page.FILE).as_uri()
-ALL = f"{PUBLISHED}#reaches=&split="  # Without the choice that the page begins with.
+ALL = f"{PUBLISHED}#reaches=&split="  # Without the filter that the page starts with.
 EVIL = "<script>alert(1)</script>", """"><img src=x onerror=alert(1)>'&amp; $x$ ]]>"""
 Table = dict[tuple[str, str, str], dict[str, Any]]  # Rows by method, source of reaches and split.
 NAMES = "method", "success", "frames"
@@ -29,7 +29,7 @@ def table() -> Table:
 
 @pytest.fixture
 def evil(tmp_path: Path) -> str:
-    """The address of a page of methods whose names, tiers and machines are no names at all."""
+    """The address of a page whose names of methods and machines contain HTML and scripts."""
     rows = standings.table([*map(result, EVIL)]).assign(rank=[1, 1], iqm=[19.5, 18.25], regret=[0.5, 1.75])
     points = pd.DataFrame({"epoch": [10, 20], "return": [1.0, 2.0]})
     curves = {"minjerk": {method: {0: points} for method in EVIL}}
@@ -41,18 +41,18 @@ def evil(tmp_path: Path) -> str:
 def result(method: str) -> dict[str, Any]:
     split = load_split("minjerk", "test")
     scores = [20.0] * 150 + [0.0] * 50
-    found = {"digest": split.digest, "scores": scores, "failed": 0, "closing_lag": 0.1}
+    split_result = {"digest": split.digest, "scores": scores, "failed": 0, "closing_lag": 0.1}
     training = {"label": method + "!", "frames": 1000, "demonstrations": 12_345, "seconds": 5400.0}
     return {
         **{"method": method, "reaches": "minjerk", "seed": 0, "tier": "re-run", "privileged": method},
-        "splits": {"test": {**found, "causes": {"solved": 150, "slipped": 50}}},
+        "splits": {"test": {**split_result, "causes": {"solved": 150, "slipped": 50}}},
         "provenance": {"machine": {"cpu": method, "cores": 2}},
         "training": training,
     }
 
 
 def shown(page: Any) -> list[str]:
-    """The methods of the rows that are visible, from the top."""
+    """The methods of the visible rows, from the top."""
     return page.eval_on_selector_all(
         "#standings tbody tr",
         "rows => rows.filter(r => r.checkVisibility()).map(r => r.querySelector('.name').innerText)",
@@ -60,7 +60,7 @@ def shown(page: Any) -> list[str]:
 
 
 def cells(page: Any) -> list[dict[str, Any]]:
-    """Every row's cells by column: what is shown, and the value that is sorted by."""
+    """The cells of every row, by column: the text, and the value for sorting."""
     return page.eval_on_selector_all(
         "#standings tbody tr",
         """rows => rows.map(row => Object.fromEntries([...row.cells].map(
@@ -68,26 +68,26 @@ def cells(page: Any) -> list[dict[str, Any]]:
     )
 
 
-def test_every_number_of_the_table_is_that_of_the_rows(browser: Any, table: Table):
+def test_every_number_equals_the_published_table(browser: Any, table: Table):
     with visit(browser, ALL) as opened:
-        found = cells(opened)
-    assert len(found) == len(table) + 1
-    quoted = [row for row in found if row["tier"][0] == "quoted"]
+        rows = cells(opened)
+    assert len(rows) == len(table) + 1
+    quoted = [row for row in rows if row["tier"][0] == "quoted"]
     assert [(row["return"][0], row["success"][0].strip()) for row in quoted] == [("15.00 ", "75.0")]
-    for row in found:
+    for row in rows:
         if row["tier"][0] == "quoted":
             continue
         name = row["method"][0].partition("ceiling")[0].partition("floor")[0].partition("policy of")[0]
-        own = table[name, row["reaches"][0], row["split"][0]]
-        assert float(row["return"][1]) == pytest.approx(own["return"], rel=1e-5)
-        interval = f"{own['return']:.2f} [{own['return_low']:.2f}, {own['return_high']:.2f}]"
+        expected = table[name, row["reaches"][0], row["split"][0]]
+        assert float(row["return"][1]) == pytest.approx(expected["return"], rel=1e-5)
+        interval = f"{expected['return']:.2f} [{expected['return_low']:.2f}, {expected['return_high']:.2f}]"
         assert row["return"][0] == interval
-        rates = [f"{100 * own[f'success{end}']:.1f}" for end in ("", "_low", "_high")]
+        rates = [f"{100 * expected[f'success{end}']:.1f}" for end in ("", "_low", "_high")]
         assert row["success"][0] == f"{rates[0]} [{rates[1]}, {rates[2]}]"
-        assert row["seeds"][0] == str(own["seeds"])
+        assert row["seeds"][0] == str(expected["seeds"])
 
 
-def test_endings_are_those_of_the_rows(browser: Any, table: Table):
+def test_endings_equal_the_published_table(browser: Any, table: Table):
     with visit(browser, ALL) as opened:
         parts = opened.eval_on_selector_all(
             "[data-split]:has(.endings)",
@@ -98,12 +98,12 @@ def test_endings_are_those_of_the_rows(browser: Any, table: Table):
     assert len(parts) == 6
     for reaches, split, rows in parts:
         for method, _, *shares, lag in rows:
-            own = table[method, reaches, split]
-            assert shares == [f"{100 * own[cause] / own['episodes']:.1f}" for cause in CAUSES]
-            assert lag in (f"{own['closing_lag']:.2f}", "\N{EN DASH}")
+            expected = table[method, reaches, split]
+            assert shares == [f"{100 * expected[cause] / expected['episodes']:.1f}" for cause in CAUSES]
+            assert lag in (f"{expected['closing_lag']:.2f}", "\N{EN DASH}")
 
 
-def test_heat_maps_weigh_up_to_the_rate_of_the_row(browser: Any, table: Table):
+def test_heat_maps_average_to_the_success_of_the_row(browser: Any, table: Table):
     with visit(browser, f"{PUBLISHED}#reaches=real&split=test") as opened:
         for heat in opened.locator(".heat").locator("visible=true").all():
             rows = heat.evaluate(
@@ -117,7 +117,7 @@ def test_heat_maps_weigh_up_to_the_rate_of_the_row(browser: Any, table: Table):
             assert mean == pytest.approx(table["rlil-0.1", "real", "test"]["success"], abs=1e-4)
 
 
-def test_it_begins_with_test_of_real_and_filters(browser: Any, table: Table):
+def test_the_page_starts_with_test_of_real_and_filters(browser: Any, table: Table):
     best = [name for name, *rest in table if rest == ["real", "test"]]
     with visit(browser, PUBLISHED) as opened:
         assert shown(opened) == [*best, "RLIL 0.1"]
@@ -131,7 +131,7 @@ def test_it_begins_with_test_of_real_and_filters(browser: Any, table: Table):
         opened.select_option("[name=split]", "train")
         assert shown(opened) == ["exp"]
         assert opened.locator("section:has(#how-episodes-end) .nothing").is_visible()
-        opened.reload()  # The choice is kept in the address.
+        opened.reload()  # The address keeps the choice.
         assert shown(opened) == ["exp"]
         opened.select_option("[name=reaches]", "minjerk")
         assert shown(opened) == []
@@ -141,7 +141,7 @@ def test_it_begins_with_test_of_real_and_filters(browser: Any, table: Table):
         assert opened.locator("figure[data-reaches]").locator("visible=true").count() == 1
 
 
-def test_headings_sort_by_click_and_by_key_and_say_so(browser: Any):
+def test_headings_sort_by_click_and_by_key_and_announce_it(browser: Any):
     with visit(browser, PUBLISHED) as opened:
         headings = {name: opened.locator(f"#standings th[scope=col][data-name={name}]") for name in NAMES}
         heading = headings["success"]
@@ -167,24 +167,24 @@ def test_the_keyboard_reaches_everything(browser: Any):
         for _ in range(12):
             opened.keyboard.press("Tab")
             reached.append(opened.evaluate("document.activeElement.name || document.activeElement.innerText"))
-        assert reached[:5] == ["To the table", "reaches", "split", "tier", "text"]
+        assert reached[:5] == ["Skip to the table", "reaches", "split", "tier", "text"]
         assert "method" in reached
         unnamed = opened.eval_on_selector_all(
             "[tabindex], a, button, select, input",
-            """found => found.filter(each => each.checkVisibility() && !(each.ariaLabel || each.innerText
-                || each.labels?.length || each.getAttribute("aria-labelledby")))""",
+            """elements => elements.filter(e => e.checkVisibility() && !(e.ariaLabel || e.innerText
+                || e.labels?.length || e.getAttribute("aria-labelledby")))""",
         )
         assert unnamed == []
 
 
-def test_it_reads_without_a_script(browser: Any, table: Table):
+def test_the_page_is_readable_without_its_script(browser: Any, table: Table):
     with visit(browser, PUBLISHED, java_script_enabled=False) as opened:
         assert opened.locator("#standings tbody tr").locator("visible=true").count() == len(table) + 1
         assert not opened.locator(".controls").is_visible()
         assert opened.locator("figure svg").locator("visible=true").count() == 4
 
 
-def test_it_has_one_caption_a_table_and_a_name_for_each_picture(browser: Any):
+def test_each_table_has_a_caption_and_each_picture_a_name(browser: Any):
     with visit(browser, ALL) as opened:
         assert opened.evaluate("[...document.querySelectorAll('table')].every(t => t.caption?.textContent)")
         assert opened.evaluate("[...document.querySelectorAll('th')].every(h => h.scope)")
@@ -194,24 +194,24 @@ def test_it_has_one_caption_a_table_and_a_name_for_each_picture(browser: Any):
         assert len(ids) == len(set(ids))
 
 
-def test_names_of_strangers_are_text_wherever_they_stand(browser: Any, evil: str):
+def test_names_of_strangers_are_text_everywhere(browser: Any, evil: str):
     with visit(browser, f"{evil}#reaches=&split=") as opened:
         opened.on("dialog", lambda dialog: pytest.fail(dialog.message))
         assert shown(opened) == [*sorted(EVIL)]
         assert opened.evaluate("[document.scripts.length, document.images.length]") == [1, 0]
         for name in EVIL:
             assert opened.get_by_text(name, exact=True).count() >= 4  # The table, endings, heat map, and the curves.
-        found = cells(opened)
-        assert [row["rank"][0] for row in found] == ["1", "1"]
-        assert [row["IQM"][0] for row in found] == ["19.50", "18.25"]
-        assert [row["regret"][0] for row in found] == ["0.50", "1.75"]
-        assert {(row["tier"][0], row["frames"][0], row["demos"][0]) for row in found} == {("re-run", "1,000", "12,345")}
-        assert found[0]["wall time"][0] == f"1.5 h{sorted(EVIL)[0]}, 2 cores"
-        assert found[0]["privileged"][0] == sorted(EVIL)[0]
+        rows = cells(opened)
+        assert [row["rank"][0] for row in rows] == ["1", "1"]
+        assert [row["IQM"][0] for row in rows] == ["19.50", "18.25"]
+        assert [row["regret"][0] for row in rows] == ["0.50", "1.75"]
+        assert {(row["tier"][0], row["frames"][0], row["demos"][0]) for row in rows} == {("re-run", "1,000", "12,345")}
+        assert rows[0]["wall time"][0] == f"1.5 h{sorted(EVIL)[0]}, 2 cores"
+        assert rows[0]["privileged"][0] == sorted(EVIL)[0]
 
 
-def test_no_script_but_its_own_may_run(browser: Any, tmp_path: Path):
-    """Should a name ever get through unescaped, the browser refuses it."""
+def test_only_the_script_of_the_page_may_run(browser: Any, tmp_path: Path):
+    """The browser would refuse a script in a name that was not escaped."""
     file = tmp_path / leaderboard_page.FILE
     file.write_text(
         (BOARD / leaderboard_page.FILE).read_text().replace("</main>", "<script>window.ran = 1</script></main>")
@@ -223,7 +223,7 @@ def test_no_script_but_its_own_may_run(browser: Any, tmp_path: Path):
     opened.close()
 
 
-def test_links_to_recordings_lead_to_files_that_ship(browser: Any):
+def test_links_to_recordings_lead_to_shipped_files(browser: Any):
     with visit(browser, ALL) as opened:
         links = opened.eval_on_selector_all("a[href$='.rrd']", "links => links.map(a => a.getAttribute('href'))")
     files = {(BOARD / link).resolve() for link in links}
@@ -233,5 +233,5 @@ def test_links_to_recordings_lead_to_files_that_ship(browser: Any):
 
 def test_equal_results_make_equal_pages(tmp_path: Path):
     rows = standings.table(map(result, EVIL))
-    made = {leaderboard_page.document(rows, map(result, EVIL), {}, tmp_path) for _ in range(2)}
-    assert len(made) == 1
+    pages = {leaderboard_page.document(rows, map(result, EVIL), {}, tmp_path) for _ in range(2)}
+    assert len(pages) == 1

@@ -1,4 +1,4 @@
-"""How the leaderboard's page looks: contrast in light and dark, on any width, on paper."""
+"""The look of the leaderboard's page: contrast in light and dark, width on any screen, print."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tests.leaderboard.page.test_document import ALL, PUBLISHED
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_stands_out_in_light_and_dark(browser: Any, scheme: Any):
+def test_text_has_enough_contrast_in_light_and_dark(browser: Any, scheme: Any):
     with visit(browser, ALL, color_scheme=scheme) as opened:
         canvas = luminance(opened.evaluate("getComputedStyle(document.body).backgroundColor"))
         assert (canvas < 0.02) == (scheme == "dark")
-        for where in (
+        for selector in (
             "p",
             "td",
             "th",
@@ -29,33 +29,33 @@ def test_text_stands_out_in_light_and_dark(browser: Any, scheme: Any):
             "caption",
             "figure svg text",
         ):
-            pairs = opened.eval_on_selector_all(where, LOOKS)
+            pairs = opened.eval_on_selector_all(selector, COLOURS)
             assert pairs
-            assert min(contrast(*pair) for pair in pairs) >= 4.5, where  # WCAG AA
+            assert min(contrast(*pair) for pair in pairs) >= 4.5, selector  # WCAG AA
 
 
-LOOKS = """found => {
+COLOURS = """elements => {
   const draw = document.createElement("canvas").getContext("2d", {willReadFrequently: true});
   const plain = colour => {
     draw.fillStyle = colour;
     draw.fillRect(0, 0, 1, 1);
     return `rgb(${[...draw.getImageData(0, 0, 1, 1).data].slice(0, 3)})`;
   };
-  const looks = element => {
-    const own = getComputedStyle(element);
-    let behind = element;
-    while (getComputedStyle(behind).backgroundColor === "rgba(0, 0, 0, 0)") behind = behind.parentElement;
-    return [element.closest("svg") ? own.fill : own.color, getComputedStyle(behind).backgroundColor].join("|");
+  const colours = element => {
+    const style = getComputedStyle(element);
+    let parent = element;
+    while (getComputedStyle(parent).backgroundColor === "rgba(0, 0, 0, 0)") parent = parent.parentElement;
+    return [element.closest("svg") ? style.fill : style.color, getComputedStyle(parent).backgroundColor].join("|");
   };
-  return [...new Set(found.map(looks))].map(pair => pair.split("|").map(plain));
+  return [...new Set(elements.map(colours))].map(pair => pair.split("|").map(plain));
 }"""
 
 
 def luminance(colour: str) -> float:
-    """Relative luminance of `rgb(r, g, b)`, as WCAG has it."""
-    parts = [int(each) / 255 for each in re.findall(r"\d+", colour)[:3]]
-    linear = [each / 12.92 if each <= 0.04045 else ((each + 0.055) / 1.055) ** 2.4 for each in parts]
-    return sum(weight * each for weight, each in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+    """Relative luminance of `rgb(r, g, b)`, by the formula of WCAG."""
+    channels = [int(number) / 255 for number in re.findall(r"\d+", colour)[:3]]
+    linear = [value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in channels]
+    return sum(weight * value for weight, value in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
 
 
 def contrast(one: str, other: str) -> float:
@@ -69,7 +69,7 @@ def test_the_page_is_never_wider_than_the_screen(browser: Any, width: int):
         assert opened.evaluate("document.documentElement.scrollWidth") == width
 
 
-def test_on_paper_there_are_no_controls_and_nothing_is_cut_off(browser: Any):
+def test_print_has_no_controls_and_cuts_nothing_off(browser: Any):
     with visit(browser, PUBLISHED, viewport={"width": 1030, "height": 700}) as opened:
         opened.emulate_media(media="print")
         assert not opened.locator(".controls").is_visible()

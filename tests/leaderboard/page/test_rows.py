@@ -1,4 +1,4 @@
-"""What the page says of how a row was made: of our runs what was measured, of submissions what was declared."""
+"""How the page describes the origin of a row: measured for runs, declared for submissions."""
 
 from __future__ import annotations
 
@@ -11,27 +11,29 @@ from dextron_bench.leaderboard.page.rows import Entry, entries
 ROW = pd.DataFrame([{"method": "mine", "reaches": "synthetic", "split": "test", "return": 5.0}])
 
 
-def entry(seconds: float | None = None, **told: Any) -> Entry:
-    made = {"machine": {"cpu": "that of the evaluation", "cores": 2}, "seconds": seconds}
-    (found,) = entries(ROW, [{"method": "mine", "reaches": "synthetic", "seed": 0, "provenance": made, **told}])
-    return found
+def entry(seconds: float | None = None, **properties: Any) -> Entry:
+    """The entry of a result with these properties, evaluated on a known machine."""
+    provenance = {"machine": {"cpu": "the evaluating machine", "cores": 2}, "seconds": seconds}
+    result = {"method": "mine", "reaches": "synthetic", "seed": 0, "provenance": provenance, **properties}
+    (row,) = entries(ROW, [result])
+    return row
 
 
-def test_a_submission_has_what_was_declared():
+def test_a_submission_has_its_declared_properties():
     declared = {"frames": 5000, "demonstrations": 0, "hours": 1.5, "hardware": "a laptop", "privileged": True}
-    found = entry(tier="replayed", declared=declared)
-    assert (found.frames, found.demonstrations, found.seconds, found.hardware) == (5000, 0, 5400.0, "a laptop")
-    assert found.privileged == "more than the state, as declared"
-    assert found.tier == "replayed"
+    row = entry(tier="replayed", declared=declared)
+    assert (row.frames, row.demonstrations, row.seconds, row.hardware) == (5000, 0, 5400.0, "a laptop")
+    assert row.privileged == "more than the state, as declared"
+    assert row.tier == "replayed"
 
 
-def test_what_was_not_declared_is_not_known():
-    found = entry(declared={"frames": None, "demonstrations": None, "hours": None, "hardware": "", "privileged": False})
-    assert (found.frames, found.demonstrations, found.seconds, found.hardware) == (None, None, None, None)
-    assert found.privileged is None
+def test_a_property_that_is_not_declared_is_unknown():
+    row = entry(declared={"frames": None, "demonstrations": None, "hours": None, "hardware": "", "privileged": False})
+    assert (row.frames, row.demonstrations, row.seconds, row.hardware) == (None, None, None, None)
+    assert row.privileged is None
 
 
-def test_a_run_has_what_was_measured():
-    found = entry(training={"frames": 7, "demonstrations": 3}, seconds=2.5)
-    assert (found.frames, found.demonstrations, found.seconds) == (7, 3, 2.5)
-    assert (found.hardware, found.tier) == ("that of the evaluation, 2 cores", "self-reported")
+def test_a_run_has_its_measured_properties():
+    row = entry(training={"frames": 7, "demonstrations": 3}, seconds=2.5)
+    assert (row.frames, row.demonstrations, row.seconds) == (7, 3, 2.5)
+    assert (row.hardware, row.tier) == ("the evaluating machine, 2 cores", "self-reported")
