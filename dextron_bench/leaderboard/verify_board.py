@@ -66,7 +66,7 @@ def check(row: Row, count: int = 0, threads: int = 0, report: Progress = no_prog
 
 
 def stamp(row: Row, finding: Finding) -> bool:
-    """Writes tier and hashes of actions into a baseline's result if all its rows ran again; returns whether they did."""
+    """Writes tier and hashes of actions into a baseline's result and returns True, if all its rows ran again."""
     if finding.problems or finding.actions.keys() != row.result["splits"].keys():
         return False
     splits = {name: split | {"actions": finding.actions[name]} for name, split in row.result["splits"].items()}

@@ -98,8 +98,8 @@ def submitted(here: Path) -> Iterator[Path]:
             tiny_benchmark.install(here / "splits", patch.setattr)
             (here / "near.py").write_text(AGENT)
             entry = submission_entry.Entry("near", f"{here}/near.py:Near", tiny_benchmark.NAME, (0, 1))
-            folder = playing.compete(entry, here / "runs", 1, Limits(start=300.0, answer=100.0), threads=1)
-            playing.finish(entry, folder, here / "near.zip")
+            folder = playing.play_entry(entry, here / "runs", 1, Limits(start=300.0, answer=100.0), threads=1)
+            playing.write_bundle(entry, folder, here / "near.zip")
             yield here
     finally:
         tiny_benchmark.forget()

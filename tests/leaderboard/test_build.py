@@ -26,7 +26,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         weights, "shipped_folder", lambda learner, reaches: tmp_path / "beside" / learner.label / reaches
     )
     common = ["--quiet", "--no-floors", "--record", "0"]
-    assert main.main(["run", "--method", "toy_learner:Toy", "--preset", "quick", "--seed", "0", "1", *common]) == 0
+    toy = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--seed", "0", "1"]
+    assert main.main(["run", *toy, *common]) == 0
     assert main.main(["run", "--method", "nothing", *common]) == 0
     yield tmp_path
     tiny_benchmark.forget()
@@ -42,7 +43,8 @@ def test_results_curves_and_weights_are_taken_over_as_they_are(here: Path):
     assert sorted(file.name for file in published.iterdir()) == ["curve.json", "result.json"]
     for name in ("curve.json", "result.json"):
         assert (published / name).read_bytes() == (run / name).read_bytes()
-    assert (here / "beside/toy-0.1/synthetic/seed1.safetensors").read_bytes() == (run / "weights.safetensors").read_bytes()
+    shipped = here / "beside/toy-0.1/synthetic/seed1.safetensors"
+    assert shipped.read_bytes() == (run / "weights.safetensors").read_bytes()
     assert [file.name for file in (here / "board/results/nothing/synthetic/seed0").iterdir()] == ["result.json"]
 
 

@@ -48,7 +48,7 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     file.write_text(file.read_text().replace("0.0", "20.0", 1))
     assert main.main(["leaderboard", "verify", "--all", "--board", "board"]) == 1
     told = capsys.readouterr().out
-    assert "NOT what its episodes give" in told
+    assert "DIFFERS from its episodes" in told
     assert "table.csv differs" in told
 
 
@@ -96,7 +96,7 @@ def test_any_episode_of_a_bundle_is_recorded_where_it_is_looked_at(
     assert capsys.readouterr().out.split() == [file]
     cut = tmp_path / "cut.zip"
     cut.write_bytes(Path(bundle).read_bytes()[:-30])
-    for place, why in ((cut, "is no whole zip file"), (tmp_path / "none.zip", "there is no file")):
+    for place, why in ((cut, "is not a complete zip file"), (tmp_path / "none.zip", "none.zip is not a file")):
         assert main.main(["view", str(place), "--print"]) == 2
         assert why in capsys.readouterr().err
     assert sorted(path.name for path in (tmp_path / "runs/submissions/.bundles").iterdir()) == [Path(file).parts[3]]
@@ -137,11 +137,11 @@ def test_a_board_of_baselines_is_run_again(submitted: Path, tmp_path: Path, caps
 
 def test_what_cannot_be_submitted_is_said(submitted: Path, capsys: pytest.CaptureFixture[str]):
     for words, why in (
-        (["--name", "a/b"], "the name 'a/b' is not one"),
+        (["--name", "a/b"], "'a/b' is not a valid name"),
         (["--name", "a", "--memory", "0"], "--timeout and --memory are more than 0"),
-        (["--name", "a", "--seed", "3"], "seeds are 0, 1, 2 and so on"),
-        (["--name", "a", "--settings", "1"], "settings are a JSON object"),
-        (["--name", "a", "--settings", "{"], "--settings is no JSON"),
+        (["--name", "a", "--seed", "3"], "seeds must be 0, 1, 2 and so on"),
+        (["--name", "a", "--settings", "1"], "--settings takes a JSON object"),
+        (["--name", "a", "--settings", "{"], "--settings is not valid JSON"),
     ):
         assert main.main(["submit", f"{submitted}/near.py:Near", *words]) == 2
         assert why in capsys.readouterr().err
@@ -158,8 +158,8 @@ def test_names_that_are_or_look_like_anothers_are_refused(name: str, tmp_path: P
 
 
 def test_settings_of_an_installed_method_are_those_with_which_it_can_be_made_again():
-    settled = entry.settle("omega", '{"near": 0.1}', "synthetic")
+    settled = entry.settings_from_json("omega", '{"near": 0.1}', "synthetic")
     assert settled["near"] == 0.1
     assert len(settled["sha256"]) == 64
-    assert entry.settle("omega", json.dumps(settled), "synthetic") == settled
-    assert entry.settle("mine.py:Mine", '{"near": 0.1}', "synthetic") == {"near": 0.1}
+    assert entry.settings_from_json("omega", json.dumps(settled), "synthetic") == settled
+    assert entry.settings_from_json("mine.py:Mine", '{"near": 0.1}', "synthetic") == {"near": 0.1}

@@ -1,1 +1,1 @@
-"""Submissions: agents tried by anyone, the bundles that tell of it, and how anyone checks them."""
+"""Submissions: playing an agent, packing its results into a bundle, and verifying the bundle."""

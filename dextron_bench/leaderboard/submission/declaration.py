@@ -1,4 +1,4 @@
-"""What the authors of a submission say of it, as no one else can know."""
+"""What the authors of a submission state about it, because nobody else can know it."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Declaration:
-    """What only the authors know: it stands on the leaderboard in their words, and nothing checks it."""
+    """What only the authors know; the leaderboard shows it unchecked."""
 
     frames: int | None = None
-    """Control steps that it was trained for."""
+    """Number of control steps in its training."""
     demonstrations: int | None = None
-    """Expert episodes that it learned from."""
+    """Number of expert episodes that it learned from."""
     hours: float | None = None
     """Hours of training."""
     hardware: str = ""
-    """What it was trained on."""
+    """Hardware of the training."""
     privileged: bool = False
-    """It is told more than the 48 numbers of the state."""
+    """The agent uses more than the 48 numbers of the state."""
     authors: str = ""
-    """Whose it is."""
+    """Names of the authors."""
     url: str = ""
-    """Where to read about it."""
+    """Address of a page about it."""
     notes: str = ""
     """Anything else."""

@@ -1,4 +1,4 @@
-"""What a submission enters: an agent under a name, with its seeds and settings."""
+"""The entry of a submission: an agent with a name, seeds and settings."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ MANIFEST_KINDS = {"method": "method", "module": "code", "file": "code", "policy"
 
 
 class BadSubmission(ValueError):
-    """What cannot be submitted; the message says what would be right."""
+    """An entry that cannot be submitted; the message says what is wrong."""
 
 
-def settle(spec: str, text: str, reaches: str) -> dict[str, Any]:
-    """An agent's settings from JSON; of an installed method all, as it is made for a source of reaches.
+def settings_from_json(spec: str, text: str, reaches: str) -> dict[str, Any]:
+    """An agent's settings from a JSON object; raises BadSubmission, BadSettings.
 
-    Raises BadSubmission, BadSettings.
+    An installed method gets all its settings, with the defaults for the source of reaches.
     """
-    found = _read(text)
-    return (
-        registry.settings_of(registry.create(spec, found, reaches)) if spec in registry.installed_methods() else found
-    )
+    settings = _json_object(text)
+    if spec in registry.installed_methods():
+        return registry.settings_of(registry.create(spec, settings, reaches))
+    return settings
 
 
-def _read(text: str) -> dict[str, Any]:
+def _json_object(text: str) -> dict[str, Any]:
     try:
-        found = json.loads(text)
+        value = json.loads(text)
     except ValueError as error:
-        raise BadSubmission(f"--settings is no JSON ({error})") from error
-    if not isinstance(found, dict):
-        raise BadSubmission("settings are a JSON object, like '{\"near\": 0.05}'")
-    return found
+        raise BadSubmission(f"--settings is not valid JSON ({error})") from error
+    if not isinstance(value, dict):
+        raise BadSubmission("--settings takes a JSON object, such as '{\"near\": 0.05}'")
+    return value
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What is submitted: an agent by the words that name it, on a source of reaches, with seeds."""
+    """What is submitted: an agent, by its spec, on a source of reaches, with seeds. Raises BadSubmission."""
 
     name: str
     spec: str
@@ -55,32 +55,38 @@ class Entry:
 
     def __post_init__(self) -> None:
         if self.name.casefold().split("-")[0] in registry.installed_methods():
-            raise BadSubmission(f"the name {self.name!r} begins like that of an installed method; choose another")
+            raise BadSubmission(f"the name {self.name!r} begins like the name of an installed method; choose another")
         if sorted(self.seeds) != list(range(len(self.seeds))):
-            raise BadSubmission("seeds are 0, 1, 2 and so on, so that nobody chooses the best: --seed 0 1 2")
+            raise BadSubmission("seeds must be 0, 1, 2 and so on, so that nobody can choose the best: --seed 0 1 2")
         if not registry.NAME.fullmatch(self.name) or len(self.name) > 64:
             raise BadSubmission(
-                f"the name {self.name!r} is not one: use up to 64 letters, digits and . _ + -, as in 'my-agent'"
+                f"{self.name!r} is not a valid name: use up to 64 letters, digits and . _ + -, as in 'my-agent'"
             )
 
     @property
     def launch(self) -> Launch:
-        """What starts the agent's process."""
+        """How to start the agent's process; raises AgentError."""
         return prepare_launch(self.spec, self.settings, self.weights)
 
     def folder(self, runs: Path) -> Path:
-        """Where the runs of its seeds lie."""
+        """The folder with the runs of its seeds."""
         return runs / FOLDER / self.name / self.reaches
 
-    def told(self) -> dict[str, Any]:
-        """What its manifest says of it."""
+    def manifest(self) -> dict[str, Any]:
+        """Its entries in the manifest of its bundle."""
         spec = self.launch.spec
         text = str(replace(spec, location=spec.file.name) if spec.file else spec)
         agent: dict[str, Any] = {"kind": MANIFEST_KINDS[spec.kind], "spec": text, "settings": self.settings}
         agent["weights"] = self.weights.name if self.weights else ""
-        told = {"name": self.name, "reaches": self.reaches, "seeds": list(self.seeds), "agent": agent}
-        return {**told, "declared": asdict(self.declared), "physics": model.mjcf_hash()}
+        return {
+            "name": self.name,
+            "reaches": self.reaches,
+            "seeds": list(self.seeds),
+            "agent": agent,
+            "declared": asdict(self.declared),
+            "physics": model.mjcf_hash(),
+        }
 
     def files(self) -> dict[str, Path]:
-        """The agent's own files, that it can be run again from, by name."""
+        """The agent's own files, by name; with them it can run again."""
         return {file.name: file for file in (self.launch.spec.file, self.weights) if file}

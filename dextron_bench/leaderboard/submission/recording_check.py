@@ -40,14 +40,14 @@ class RecordingCheck:
         name = summary.file.name
         hashes = {fingerprint(episode), self._accepted.get((split, row), "")}
         if fingerprint(recorded.episode) not in hashes or recorded.episode.setting != episode.setting:
-            self.problems.append(f"recordings/{name} is not of the episode that its actions give")
+            self.problems.append(f"recordings/{name} does not hold the episode that its actions give")
         expected = {**self._claims, "split": split, "row": row}
         if other := [key for key, value in expected.items() if recorded.properties.get(key) != value]:
             key = other[0]
             self.problems.append(f"recordings/{name} says {key} {recorded.properties.get(key)}, not {expected[key]}")
 
     def strays(self, rows: Iterable[tuple[str, int]]) -> list[str]:
-        """Names of recordings that are of none of these rows, sorted by split and row."""
+        """Names of recordings that belong to none of these rows, sorted by split and row."""
         return [self._summaries[place].file.name for place in sorted(self._summaries.keys() - set(rows))]
 
     def _screened(self, seed: int, report: Progress) -> Iterator[tuple[tuple[str, int], recording.Summary]]:

@@ -1,4 +1,4 @@
-"""How to start the agent of a bundle again."""
+"""Starts the agent of a bundle again, from the files of the bundle alone."""
 
 from __future__ import annotations
 
@@ -18,23 +18,20 @@ LOCATION = re.compile(r"[A-Za-z0-9][\w.+-]*", re.ASCII)  # A file of the bundle,
 CLASS = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
-def launch_of(told: Mapping[str, Any], files: Path) -> Launch:
-    """How to start the agent that a manifest tells of, from the files that it brought alone.
-
-    Raises BadBundle, AgentError.
-    """
-    if told["kind"] == "exec":
-        raise bundle.BadBundle("an agent that is a program of its own cannot be run again from its bundle")
-    spec = _checked_spec(told["kind"], told["spec"])
-    weights = _own(files, told["weights"]) if told["weights"] else None
+def launch_of(agent: Mapping[str, Any], files: Path) -> Launch:
+    """How to start the agent that a manifest describes, from the folder of its files; raises BadBundle, AgentError."""
+    if agent["kind"] == "exec":
+        raise bundle.BadBundle("a bundle does not contain the program of an `exec:` agent, so it cannot run again")
+    spec = _checked_spec(agent["kind"], agent["spec"])
+    weights = _agent_file(files, agent["weights"]) if agent["weights"] else None
     if spec.file:
-        spec = replace(spec, location=str(_own(files, spec.location)))
-    return prepare_launch(str(spec), told["settings"], weights)
+        spec = replace(spec, location=str(_agent_file(files, spec.location)))
+    return prepare_launch(str(spec), agent["settings"], weights)
 
 
 def _checked_spec(kind: str, text: str) -> AgentSpec:
     """The spec of a manifest if it names an installed method, a module, or a file without folders; raises BadBundle."""
-    refusal = bundle.BadBundle(f"{text!r} names no agent of kind {kind!r}")
+    refusal = bundle.BadBundle(f"{text!r} does not name an agent of kind {kind!r}")
     try:
         spec = specs.parse(text)
     except specs.BadSpec as error:
@@ -48,7 +45,8 @@ def _checked_spec(kind: str, text: str) -> AgentSpec:
     return spec
 
 
-def _own(files: Path, name: str) -> Path:
+def _agent_file(files: Path, name: str) -> Path:
+    """The path of an agent's file; raises BadBundle if the bundle has no such file."""
     if Path(name).name != name or not (files / name).is_file():
         raise bundle.BadBundle(f"the bundle lacks the agent's file {name}")
     return files / name

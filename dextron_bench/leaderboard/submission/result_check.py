@@ -1,4 +1,4 @@
-"""What a submission's result says, beside what its episodes give, and whether bits can be held against it."""
+"""Compares the result of a submission with the result computed from its episodes."""
 
 from __future__ import annotations
 
@@ -10,36 +10,37 @@ import numpy as np
 from dextron_bench.storage import provenance
 
 
-def same_platform(told: dict[str, Any]) -> bool:
-    """Whether a provenance is of a machine like this one, on which episodes must be equal bit for bit."""
+def same_platform(claimed: dict[str, Any]) -> bool:
+    """True if a provenance names the platform of this machine: episodes must then be equal bit for bit."""
     here = provenance.collect(physics="")
     try:
-        versions = told["versions"]["mujoco"] == here["versions"]["mujoco"]
-        return versions and told["machine"]["cpu"] == here["machine"]["cpu"] and _kind(told) == _kind(here)
+        versions = claimed["versions"]["mujoco"] == here["versions"]["mujoco"]
+        return versions and claimed["machine"]["cpu"] == here["machine"]["cpu"] and _system(claimed) == _system(here)
     except (KeyError, TypeError):
-        return True  # Whoever does not say is held to the bits.
+        return True  # A provenance without a platform gets no tolerance.
 
 
-def _kind(told: dict[str, Any]) -> str:
-    return str(told["machine"]["system"]).partition("-")[0]
+def _system(claimed: dict[str, Any]) -> str:
+    """The name of the operating system."""
+    return str(claimed["machine"]["system"]).partition("-")[0]
 
 
 def differences(result: dict[str, Any], computed: dict[str, Any]) -> Iterator[str]:
-    """Where a result is not what its episodes give."""
+    """A line for each entry of a result that differs from the computed result."""
     for name in ("method", "reaches", "seed", "provenance"):
         if result[name] != computed[name]:
             yield f"its result says {name} {result[name]!r}, not {computed[name]!r}"
     for split in sorted(result["splits"].keys() | computed["splits"].keys()):
-        told, found = result["splits"].get(split, {}), computed["splits"].get(split, {})
-        for name in sorted(told.keys() | found.keys()):
-            if told.get(name) != found.get(name):
-                where = _first(told.get(name), found.get(name))
-                yield f"its result has {name} on {split} that its episodes do not give{where}"
+        claims, facts = result["splits"].get(split, {}), computed["splits"].get(split, {})
+        for name in sorted(claims.keys() | facts.keys()):
+            if claims.get(name) != facts.get(name):
+                row = _first_difference(claims.get(name), facts.get(name))
+                yield f"its result has {name} on {split} that its episodes do not give{row}"
 
 
-def _first(told: Any, found: Any) -> str:
-    """The first place where two lists of scores part."""
-    if not isinstance(told, list) or not isinstance(found, list) or len(told) != len(found):
+def _first_difference(claimed: Any, computed: Any) -> str:
+    """The first row in which two lists differ, in brackets; empty if they are not lists of equal length."""
+    if not isinstance(claimed, list) or not isinstance(computed, list) or len(claimed) != len(computed):
         return ""
-    row = int(np.flatnonzero([a != b for a, b in zip(told, found, strict=True)])[0])
-    return f" (row {row}: {told[row]}, not {found[row]})"
+    row = int(np.flatnonzero([first != second for first, second in zip(claimed, computed, strict=True)])[0])
+    return f" (row {row}: {claimed[row]}, not {computed[row]})"

@@ -52,7 +52,7 @@ class SeedCheck:
         finding.add(*self._provenance_faults(result))
         self._compare(finding, replayed, result, lenient)
         for name in recordings.strays(self._traces):
-            finding.add(f"recordings/{name} is of no row of the splits")
+            finding.add(f"recordings/{name} belongs to no row of the splits")
         return finding
 
     def rerun(self, limits: Limits, threads: int, report: Progress) -> SeedFinding:
@@ -63,10 +63,10 @@ class SeedCheck:
         try:
             launch = relaunch.launch_of(self._manifest["agent"], self._agent_files)
             for split in self._splits:
-                for row, episode in playing.shuffled(launch, source, split, self._seed, limits, threads):
+                for row, episode in playing.play_shuffled(launch, source, split, self._seed, limits, threads):
                     done += 1
                     if fingerprint(episode) != self._traces[split.name, row]:
-                        differing.append(f"{split.name} row {row}: the agent, run again, acts otherwise")
+                        differing.append(f"{split.name} row {row}: the agent, run again, acts differently")
                     report(done, total, f"seed {self._seed}, running again")
         except (AgentError, bundle.BadBundle) as error:
             differing.append(str(error))

@@ -1,4 +1,4 @@
-"""A folder with an agent to begin with."""
+"""Copies the template of an agent into a new folder."""
 
 from __future__ import annotations
 
@@ -9,17 +9,15 @@ FILES = ("agent.py", "test_agent.py")
 
 
 class FolderInUse(FileExistsError):
-    """A folder that holds files already."""
+    """A folder that is not new and not empty."""
 
 
-def begin(folder: Path) -> list[Path]:
-    """Writes the starter's files into a new or empty folder; returns them. Raises FolderInUse, OSError."""
+def copy_template(folder: Path) -> list[Path]:
+    """Writes the template's files into a new or empty folder and returns them; raises FolderInUse, OSError."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise FolderInUse(f"{folder} is there already; name a new folder")
+        raise FolderInUse(f"{folder} exists already; name a new folder")
     folder.mkdir(parents=True, exist_ok=True)
-    made = []
+    template = files("dextron_bench.leaderboard.submission.template")
     for name in FILES:
-        text = files("dextron_bench.leaderboard.submission.template").joinpath(name).read_text(encoding="utf-8")
-        (folder / name).write_text(text, encoding="utf-8")
-        made.append(folder / name)
-    return made
+        (folder / name).write_text(template.joinpath(name).read_text(encoding="utf-8"), encoding="utf-8")
+    return [folder / name for name in FILES]

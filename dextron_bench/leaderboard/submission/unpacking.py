@@ -1,4 +1,4 @@
-"""Bundles as folders of runs, so that what looks at runs can look at a submission."""
+"""Unpacks a bundle into a folder of runs, so that `dextron-bench view` can show its episodes."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import hashing
 from dextron_bench.storage.run_folder import seed_folders
 
-FOLDER = Path(entry.FOLDER, ".bundles")  # In the folder of runs; no submission can be called so.
+FOLDER = Path(entry.FOLDER, ".bundles")  # In the folder of runs; not a valid name of a submission.
 
 
-def opened(file: Path, runs: Path) -> Path:
-    """The folder below `runs` with the runs of a bundle, called by its SHA-256; unpacked where it is not there yet.
+def unpack_for_viewing(file: Path, runs: Path) -> Path:
+    """The folder below `runs` with the runs of a bundle; unpacks the bundle if the folder does not exist yet.
 
-    Its names, hashes and tables were checked; whether its episodes are what its actions give is for `verification`.
+    The bundle's SHA-256 names the folder. Checks names, hashes and tables; only `verification` replays the actions.
     Raises BadBundle, MissingData, OSError.
     """
     if not file.is_file():
-        raise bundle.BadBundle(f"there is no file {file}")
+        raise bundle.BadBundle(f"{file} is not a file")
     place = runs / FOLDER / hashing.sha256(file)[:16]
     if place.is_dir():
         return place
@@ -28,9 +28,9 @@ def opened(file: Path, runs: Path) -> Path:
     with TemporaryDirectory(prefix=".unpacking-", dir=place.parent) as folder:
         part = Path(folder) / "bundle"
         manifest = bundle.unpack(file, part)
-        wanted = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
+        splits = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
         for run in seed_folders(part):
-            for fault in episode_tables.faults(episode_tables.read(run.episodes, wanted), wanted):
+            for fault in episode_tables.faults(episode_tables.read(run.episodes, splits), splits):
                 raise bundle.BadBundle(f"{file}: {run.path.name}: {fault}")
         part.replace(place)
     return place

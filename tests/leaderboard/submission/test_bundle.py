@@ -60,13 +60,13 @@ def unsafe(submitted: Path, tmp_path: Path) -> Unsafe:
     ],
 )
 def test_paths_and_kinds_that_no_bundle_has_are_refused(name: str, unsafe: Unsafe, tmp_path: Path):
-    assert f"a bundle has no file {name!r}" in unsafe.add(name, b"x").refused(tmp_path / "into")
+    assert f"a bundle cannot hold a file {name!r}" in unsafe.add(name, b"x").refused(tmp_path / "into")
 
 
 def test_ways_of_packing_that_hide_sizes_are_refused(unsafe: Unsafe, tmp_path: Path):
     unsafe.add("agent/zeros.pt", bytes(2**20))
     unsafe.members[-1][0].compress_type = zipfile.ZIP_BZIP2
-    assert "agent/zeros.pt is packed in a way" in unsafe.refused(tmp_path / "into")
+    assert "uses a compression method whose output size cannot be limited" in unsafe.refused(tmp_path / "into")
 
 
 def test_links_twins_and_strays_are_refused(submitted: Path, unsafe: Unsafe, tmp_path: Path):
@@ -76,12 +76,12 @@ def test_links_twins_and_strays_are_refused(submitted: Path, unsafe: Unsafe, tmp
     twin = Unsafe(submitted / "near.zip", unsafe.file).add("seed0/result.json", b"{}")
     assert "holds seed0/result.json twice" in twin.refused(tmp_path / "into")
     stray = Unsafe(submitted / "near.zip", unsafe.file).add("agent/more.py", b"")
-    assert "holds agent/more.py, which its manifest has not" in stray.refused(tmp_path / "into")
+    assert "holds agent/more.py, which its manifest does not list" in stray.refused(tmp_path / "into")
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(unsafe: Unsafe, tmp_path: Path):
     bomb = unsafe.add("agent/zeros.pt", bytes(bundle.LARGEST + 1))
-    assert "agent/zeros.pt would unpack to too much (256 MiB)" in bomb.refused(tmp_path / "into")
+    assert "agent/zeros.pt is too large when unpacked (256 MiB)" in bomb.refused(tmp_path / "into")
     assert bomb.file.stat().st_size < 2**21
 
 
@@ -94,10 +94,10 @@ def test_a_changed_byte_is_refused(submitted: Path, unsafe: Unsafe, tmp_path: Pa
     for place, (info, content) in enumerate(unsafe.members):
         if info.filename == "seed1/result.json":
             unsafe.members[place] = (info, content.replace(b"20.0", b"19.0", 1))
-    assert "seed1/result.json is not the file whose SHA-256 the manifest has" in unsafe.refused(tmp_path / "into")
+    assert "seed1/result.json has another SHA-256 than the manifest lists" in unsafe.refused(tmp_path / "into")
     cut = tmp_path / "cut.zip"
     cut.write_bytes((submitted / "near.zip").read_bytes()[:-30])
-    with pytest.raises(bundle.BadBundle, match="no whole zip file"):
+    with pytest.raises(bundle.BadBundle, match="not a complete zip file"):
         bundle.unpack(cut, tmp_path / "other")
 
 
@@ -106,7 +106,7 @@ def test_only_what_belongs_to_the_seeds_is_packed(submitted: Path, tmp_path: Pat
     folder = submitted / "runs" / entry.FOLDER / "near" / tiny_benchmark.NAME
     shutil.copytree(folder, tmp_path / "near")
     (tmp_path / "near/seed0/.episodes.parquet.77.part").touch()
-    told = entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0,)).told()
+    told = entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0,)).manifest()
     found = bundle.pack(tmp_path / "near", told, {}, tmp_path / "near.zip")["files"]
     assert {name.split("/")[0] for name in found} == {"seed0"}
     assert not [name for name in found if "part" in name]
@@ -115,7 +115,7 @@ def test_only_what_belongs_to_the_seeds_is_packed(submitted: Path, tmp_path: Pat
 def test_an_agents_file_that_no_bundle_takes_is_told_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     file = tmp_path / "_mine.py"
     file.touch()
-    with pytest.raises(bundle.BadBundle, match=r"a bundle has no file 'agent/_mine\.py'"):
+    with pytest.raises(bundle.BadBundle, match=r"a bundle cannot hold a file 'agent/_mine\.py'"):
         bundle.check_agent({file.name: file})
     monkeypatch.setattr(bundle, "LARGEST", -1)
     with pytest.raises(bundle.BadBundle, match="is larger than"):

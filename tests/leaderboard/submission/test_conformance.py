@@ -67,7 +67,7 @@ def test_the_agent_to_begin_with_is_ready_and_passes_its_own_test(tmp_path: Path
     assert "mend" not in told
     assert "ready: dextron-bench submit" in told
     assert main.main(["new-agent", str(folder)]) == 2
-    assert "is there already; name a new folder" in capsys.readouterr().err
+    assert "exists already; name a new folder" in capsys.readouterr().err
 
 
 def test_what_is_drawn_without_the_seed_is_to_be_mended(tmp_path: Path):
@@ -85,14 +85,14 @@ def test_actions_that_depend_on_other_rows_are_noted(tmp_path: Path):
 def test_what_fails_ends_the_checks(tmp_path: Path):
     told = found(tmp_path, "return np.full((len(states), 1), 2.0)")
     assert list(told) == ["it starts", "actions are finite, in [-1, 1], one a row"]
-    assert "3 episodes failed: action 2 is outside [-1, 1] at step 0" in list(told.values())[1].found
+    assert "3 episodes failed: action 2 is outside [-1, 1] at step 0" in list(told.values())[1].detail
     (tmp_path / "mine.py").write_text("import nothing_of_that_name")
     (only,) = checks(prepare_launch(f"{tmp_path}/mine.py:Agent"))
     assert (only.what, only.verdict) == ("it starts", MEND)
-    assert "nothing_of_that_name" in only.found
+    assert "nothing_of_that_name" in only.detail
 
 
 def test_an_agent_that_cannot_serve_many_episodes_is_to_be_mended(tmp_path: Path):
     told = found(tmp_path, "return np.zeros((min(len(states), 9), 1))")
     assert told["it is quick enough"].verdict == MEND
-    assert "act() must return floats of shape (256, 1)" in told["it is quick enough"].found
+    assert "act() must return floats of shape (256, 1)" in told["it is quick enough"].detail

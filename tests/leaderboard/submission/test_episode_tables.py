@@ -16,13 +16,13 @@ from tests.helpers.forged_bundles import Forgery, row
         (lambda table: table.assign(row=table["row"].astype("Int64").where(table.index > 0)), "without its row"),
         (row(1, split=None), "without its split"),
         (row(1, actions=None), "without its actions"),
-        (row(1, final=[0.0] * 47), "a last state that is not 48 numbers"),
+        (row(1, final=[0.0] * 47), "a last state without exactly 48 numbers"),
         (row(1, failure="x" * 2_000_000), "has texts of 20000"),
         (lambda table: table.drop(columns="trace"), "it lacks b'trace'"),
         (lambda table: table.drop(columns="score"), "differs in 'score'"),
         (lambda table: table.assign(more=1), "differs in 'more'"),
         (lambda table: table.assign(score="20"), "has large_string in column 'score'"),
-        (lambda table: pd.concat([table, table[:1]]), "has 5 episodes where the splits have 4"),
+        (lambda table: pd.concat([table, table[:1]]), "has 5 episodes, but the splits have 4"),
     ],
 )
 def test_forms_that_no_run_writes_are_refused(change, why: str, forged: Forgery):
@@ -42,14 +42,14 @@ def test_more_row_groups_than_a_run_writes_are_refused(forged: Forgery, monkeypa
     file = forged.seed / "episodes.parquet"
     monkeypatch.setattr("dextron_bench.leaderboard.submission.episode_tables.GROUPS", 3)
     pq.write_table(pq.read_table(file), file, row_group_size=1)
-    assert "has 4 row groups; 3 are plenty" in forged.checked().problems[0]
+    assert "has 4 row groups, more than 3" in forged.checked().problems[0]
 
 
 def test_what_is_no_table_is_refused(forged: Forgery):
     (forged.seed / "episodes.parquet").write_bytes(b"PAR1 nothing PAR1")
-    assert "is no table that can be read" in forged.checked().problems[0]
+    assert "cannot be read as a table" in forged.checked().problems[0]
 
 
 def test_a_text_that_would_fill_the_memory_is_refused(forged: Forgery):
     forged.table(row(2, failure="x" * 5000))
-    assert "has texts of more than 1000 letters in column 'failure'" in forged.checked().problems[0]
+    assert "has texts of more than 1000 characters in column 'failure'" in forged.checked().problems[0]

@@ -38,19 +38,19 @@ def test_equal_submissions_are_equal_bytes_and_nothing_is_played_twice(submitted
         raise AssertionError("played again")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(playing, "shuffled", forbidden)
-        folder = playing.compete(entry, submitted / "runs", 1, Limits(), threads=1)
-    playing.finish(entry, folder, tmp_path / "again.zip")
+        patch.setattr(playing, "play_shuffled", forbidden)
+        folder = playing.play_entry(entry, submitted / "runs", 1, Limits(), threads=1)
+    playing.write_bundle(entry, folder, tmp_path / "again.zip")
     assert (tmp_path / "again.zip").read_bytes() == (submitted / "near.zip").read_bytes()
 
 
 def test_episodes_are_played_in_an_order_that_depends_on_split_and_seed():
     split = Split("test", "synthetic", tuple(cases_from_frame(tiny_benchmark.ROWS)) * 20, "0" * 64)
-    first, second = playing.order(split, 0), playing.order(split, 1)
+    first, second = playing.row_order(split, 0), playing.row_order(split, 1)
     assert sorted(first) == list(range(len(split.cases)))
     assert list(first) != list(range(len(first)))
     assert list(first) != list(second)
-    assert list(playing.order(replace(split, digest="1" * 64), 0)) != list(first)
+    assert list(playing.row_order(replace(split, digest="1" * 64), 0)) != list(first)
 
 
 def test_a_changed_reward_is_caught(forged: Forgery):
@@ -84,7 +84,9 @@ def test_a_changed_state_is_caught_though_the_recording_is_hashed_again(forged: 
     source = sources.open_source(tiny_benchmark.NAME)
     changed = replace(told.episode, states=states)
     recording.write(file, changed, source.path(changed.setting), told.properties)
-    assert forged.checked().problems == ["seed0: recordings/test-0000.rrd is not of the episode that its actions give"]
+    assert forged.checked().problems == [
+        "seed0: recordings/test-0000.rrd does not hold the episode that its actions give"
+    ]
 
 
 def test_a_recording_under_another_name_is_caught(forged: Forgery):
@@ -94,9 +96,9 @@ def test_a_recording_under_another_name_is_caught(forged: Forgery):
     recording.write(file, told.episode, path, {**told.properties, "method": "other"})
     assert forged.checked().problems == ["seed0: recordings/test-0000.rrd says method other, not near"]
     file.rename(file.with_name("test-0001.rrd"))
-    assert "test-0001.rrd is not of the episode" in forged.checked().problems[0]
+    assert "test-0001.rrd does not hold the episode" in forged.checked().problems[0]
     file.with_name("test-0001.rrd").rename(file.with_name("test-0900.rrd"))
-    assert "test-0900.rrd is of no row of the splits" in forged.checked().problems[0]
+    assert "test-0900.rrd belongs to no row of the splits" in forged.checked().problems[0]
 
 
 def test_a_damaged_recording_is_caught(forged: Forgery):
@@ -107,13 +109,13 @@ def test_a_damaged_recording_is_caught(forged: Forgery):
 
 def test_a_changed_setting_is_caught(forged: Forgery):
     forged.table(row(2, offset_x=-0.015, offset_y=0.005))
-    assert "test: row 2 was played in another setting than the split's" in forged.checked().problems[0]
+    assert "test: row 2 has another setting than the split" in forged.checked().problems[0]
 
 
 def test_a_dropped_episode_is_caught(forged: Forgery):
     forged.table(lambda table: table[table["score"] > 0])
     forged.conclude()
-    assert "has 3 episodes where the splits have 4" in forged.checked().problems[0]
+    assert "has 3 episodes, but the splits have 4" in forged.checked().problems[0]
 
 
 def test_a_good_episode_twice_in_place_of_a_bad_one_is_caught(forged: Forgery):
@@ -124,10 +126,10 @@ def test_a_good_episode_twice_in_place_of_a_bad_one_is_caught(forged: Forgery):
     forged.table(twice)
     forged.conclude()
     problems = forged.checked().problems
-    assert "test: row 0 is there 2 times" in problems[0]
+    assert "test: row 0 appears 2 times" in problems[0]
     assert "test: row 2 is missing" in problems[1]
     forged.table(lambda table: table.assign(row=[0, 1, 0, 2]))
-    assert "row 2 was played in another setting" in "".join(forged.checked().problems)
+    assert "row 2 has another setting" in "".join(forged.checked().problems)
 
 
 def test_swapped_splits_are_caught(forged: Forgery):
@@ -135,7 +137,7 @@ def test_swapped_splits_are_caught(forged: Forgery):
     forged.table(lambda table: table.assign(split=table["split"].map(names)))
     assert "was played on another version of the split" in forged.checked().problems[0]
     forged.table(lambda table: table.assign(split="train"))
-    assert "train is none of the splits that rank methods" in forged.checked().problems[0]
+    assert "train is not a split that ranks methods" in forged.checked().problems[0]
 
 
 def test_an_edited_result_is_caught(forged: Forgery):
@@ -167,7 +169,7 @@ def test_another_agents_episodes_are_caught_unless_the_agent_itself_does_the_sam
     place = forged.board / "results" / "first" / "synthetic" / "seed0"
     place.mkdir(parents=True)
     (place / "result.json").write_text(json.dumps(other))
-    line = "seed0: 3 of 3 episodes on test have the very actions of 'first', seed 0"
+    line = "seed0: 3 of 3 episodes on test have exactly the actions of 'first', seed 0"
     refused = forged.checked()
     assert line in refused.problems
     again = forged.checked(rerun=True)
@@ -222,4 +224,4 @@ def test_another_platform_is_held_to_outcomes_and_says_so(forged: Forgery):
 def test_a_provenance_from_which_no_page_could_be_made_is_refused(told: dict[str, Any], forged: Forgery):
     forged.json("seed0/provenance.json", lambda whole: whole.update(told))
     forged.json("seed0/result.json", lambda result: result["provenance"].update(told))
-    assert "in the result is not" in forged.checked().problems[0] or "text" in forged.checked().problems[0]
+    assert "in the result is invalid" in forged.checked().problems[0] or "text" in forged.checked().problems[0]

@@ -1,1 +1,1 @@
-"""What `dextron-bench new-agent` copies: a small agent that works, and its test."""
+"""The template that `dextron-bench new-agent` copies: a small working agent and its test."""

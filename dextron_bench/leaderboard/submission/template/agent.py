@@ -1,28 +1,28 @@
-"""An agent for dextron-bench: opens the hand on the way, closes it near the bottle. Make it better."""
+"""An agent for dextron-bench: opens the hand far from the bottle and closes it near the bottle. Improve it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-BOTTLE, PALM = slice(0, 2), slice(7, 9)  # Where x and y [m] of bottle and palm stand in a state.
+BOTTLE, PALM = slice(0, 2), slice(7, 9)  # Indices of x and y [m] of bottle and palm in a state.
 
 
 class MyAgent:
-    """Closes for good once the palm has been within a distance of the bottle."""
+    """Starts to close when the palm comes within a distance of the bottle, and then keeps closing."""
 
     name = "my-agent"
 
     def __init__(self, near: float = 0.12) -> None:
-        """Takes its settings, each with a default; `near` is a distance [m]."""
+        """Takes the settings, each with a default; `near` is a distance [m]."""
         self.near = near
-        self._closing = np.zeros(0, bool)  # What it remembers of each episode.
+        self._closing = np.zeros(0, bool)  # One flag for each episode.
 
     def agent(self, seed: int) -> MyAgent:
-        """The agent for a seed; one that draws random numbers begins its generator with it."""
+        """The agent for a seed; an agent that uses random numbers seeds its generator with it."""
         return self
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Is told which rows of the states to come begin a new episode: forget what you know of those."""
+        """Receives the rows of the next states that begin a new episode; their memory must be cleared."""
         missing = max(0, int(episodes.max(initial=-1)) + 1 - len(self._closing))
         self._closing = np.pad(self._closing, (0, missing))
         self._closing[episodes] = False

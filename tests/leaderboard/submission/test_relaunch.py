@@ -17,7 +17,7 @@ def test_an_agent_that_did_not_play_these_episodes_is_caught(forged: Forgery):
     code.write_text(code.read_text().replace("1.0, -1.0", "0.9, -1.0"))
     assert forged.checked().sound
     problems = forged.checked(rerun=True).problems
-    assert "the agent, run again, acts otherwise" in problems[0]
+    assert "the agent, run again, acts differently" in problems[0]
 
 
 PARROT = """
@@ -63,9 +63,9 @@ def test_an_agent_that_cannot_be_run_again_is_told(forged: Forgery):
 def test_a_manifest_starts_nothing_but_what_its_bundle_brought(
     kind: str, spec: str, forged: Forgery, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(playing, "launch", lambda *_: pytest.fail("it was started"))
+    monkeypatch.setattr(playing, "IsolatedAgent", lambda *_: pytest.fail("an agent was started"))
     forged.json("bundle.json", lambda told: told["agent"].update(kind=kind, spec=spec))
-    assert f"{spec!r} names no agent of kind {kind!r}" in forged.checked(rerun=True).problems[0]
+    assert f"{spec!r} does not name an agent of kind {kind!r}" in forged.checked(rerun=True).problems[0]
 
 
 @pytest.mark.parametrize(
