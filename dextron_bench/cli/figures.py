@@ -15,9 +15,9 @@ from dextron_bench.reaches.sources import RankedSource
 class Figures:
     """Draw the paper's figures 3, 4 and 5, and the README's pictures.
 
-    3: the start points of solvable settings, and all reaches. 4: learning curves of the methods that train in the
-    simulated world, of the success model, and of behaviour cloning. 5: the predictions of the success model in five
-    kinds of episodes; the command plays and selects these episodes again.
+    Figure 3 shows the start points of solvable settings, and all reaches. Figure 4 shows learning curves of the methods
+    that train in the simulated world, of the success model, and of behaviour cloning. Figure 5 shows the predictions of
+    the success model in five kinds of episodes; the command plays and selects these episodes again.
 
     Example: dextron-bench figures --reaches synthetic --into figures
     """

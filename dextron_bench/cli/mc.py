@@ -32,7 +32,7 @@ class MonteCarlo:
     extend: bool = False
     """Start from the shipped database of this source of reaches, not from an empty one."""
     runs: Path = Path("runs")
-    """Folder of all runs; the search is stored in it."""
+    """Folder of all runs; also holds the files of the search."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False

@@ -34,8 +34,7 @@ class List:
     )
     """Folders of runs or recordings, or single recordings."""
     check: bool = False
-    """Read each recording completely and compare it with its digest and the manifest of its run; by default only its
-    properties are read."""
+    """Compare the content of each recording with its digest and its run's manifest; default: read properties only."""
     json: bool = False
     """Print JSON, one object for each recording."""
 

@@ -33,7 +33,7 @@ class Data:
     threads: int = 0
     """Threads of the simulation; 0 means one per processor."""
     runs: Path = Path("runs")
-    """Folder of all runs; the data set is stored in it."""
+    """Folder of all runs; also holds the data set."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
