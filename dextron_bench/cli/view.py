@@ -154,7 +154,9 @@ class View:
         if not self.print:
             _print_episodes(table)
         if len(table) < matching and wanted.worst is None and wanted.best is None:
-            line = f"{matching} episodes pass the filter; these are the first {len(table)}, --worst {matching} selects all"
+            line = (
+                f"{matching} episodes pass the filter; these are the first {len(table)}, --worst {matching} selects all"
+            )
             print(f"dextron-bench: {line}", file=sys.stderr)
         return files
 
