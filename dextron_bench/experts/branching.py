@@ -62,6 +62,8 @@ class _BranchingRollout:
         self._is_stem = np.zeros(n, bool)
         self._gain, self._critical, self._first, self._return = np.zeros((4, n))
         self._length = np.zeros(n, int)
+        state = (self._number, self._expert, self._gain, self._critical, self._first, self._return, self._length)
+        self._per_slot = state  # What a fork copies.
         self._batches: dict[int, ExpertBatch] = {}
         self._ranks: dict[int, np.ndarray] = {}
         self._outcomes: dict[int, Outcomes] = {}
@@ -127,15 +129,7 @@ class _BranchingRollout:
             branch = self._free.pop()
             self._reserved -= 1
             self._engine.fork(np.array([slot]), np.array([branch]))
-            for per_slot in (
-                self._number,
-                self._expert,
-                self._gain,
-                self._critical,
-                self._first,
-                self._return,
-                self._length,
-            ):
+            for per_slot in self._per_slot:
                 per_slot[branch] = per_slot[slot]
             self._is_stem[branch] = False
             self._live = np.append(self._live, branch)

@@ -92,20 +92,9 @@ def statistics(draws: pd.DataFrame, source: setting.Source) -> pd.DataFrame:
 
     Columns: by, value, draws, kept, solved, then `kept_rate` and `solved_rate` in [0, 1].
     """
-    strata = {name: source.stratum(name) for name in draws["reach"].unique()}
-    for_reach = draws["reach"].map
-    keys = {
-        "all": pd.Series("all", index=draws.index),
-        "subject": for_reach(lambda name: strata[name].subject),
-        "ring": for_reach(lambda name: str(strata[name].ring)),
-        "angle": for_reach(lambda name: str(strata[name].angle)),
-        "region": for_reach(lambda name: f"{strata[name].ring}{strata[name].angle}"),
-        "d_c": _bands(draws["critical"], np.linspace(0.0, 0.9, BANDS + 1)),
-        "duration": _bands(pd.Series([source.duration(s) for s in setting.from_frame(draws)]), np.arange(11.0)),
-    }
     outcome = pd.DataFrame({"kept": draws["score"] > blocks.KEPT, "solved": draws["score"] == task.SUCCESS})
     parts = []
-    for by, key in keys.items():
+    for by, key in _groups(draws, source).items():
         counted = outcome.groupby(key, sort=True).agg(["size", "sum"])
         part = pd.DataFrame(
             {"draws": counted["kept", "size"], "kept": counted["kept", "sum"], "solved": counted["solved", "sum"]}
@@ -114,6 +103,21 @@ def statistics(draws: pd.DataFrame, source: setting.Source) -> pd.DataFrame:
     table = pd.concat(parts, ignore_index=True)
     table["kept_rate"], table["solved_rate"] = table["kept"] / table["draws"], table["solved"] / table["draws"]
     return table[["by", "value", "draws", "kept", "solved", "kept_rate", "solved_rate"]]
+
+
+def _groups(draws: pd.DataFrame, source: setting.Source) -> dict[str, pd.Series]:
+    """The group of each draw as text, for each way to group the draws."""
+    strata = {name: source.stratum(name) for name in draws["reach"].unique()}
+    for_reach = draws["reach"].map
+    return {
+        "all": pd.Series("all", index=draws.index),
+        "subject": for_reach(lambda name: strata[name].subject),
+        "ring": for_reach(lambda name: str(strata[name].ring)),
+        "angle": for_reach(lambda name: str(strata[name].angle)),
+        "region": for_reach(lambda name: f"{strata[name].ring}{strata[name].angle}"),
+        "d_c": _bands(draws["critical"], np.linspace(0.0, 0.9, BANDS + 1)),
+        "duration": _bands(pd.Series([source.duration(s) for s in setting.from_frame(draws)]), np.arange(11.0)),
+    }
 
 
 def _bands(values: pd.Series, edges: np.ndarray) -> pd.Series:

@@ -102,15 +102,11 @@ def run(
     blocks.write_or_check(asdict(search), folder)
     done = blocks.update_tallies(folder, {})
     report(blocks.total(done))
-    if blocks.last_block_needed(done, rows) is None:
-        for number, draws in _play(source, search, engine, done, share or Share()):
-            blocks.write(folder, number, draws)
-            done = blocks.update_tallies(folder, done)
-            report(blocks.total(done))
-            if blocks.last_block_needed(done, rows) is not None:
-                break
-    last = blocks.last_block_needed(done, rows)
-    assert last is not None
+    new_blocks = _play(source, search, engine, done, share or Share())
+    while (last := blocks.last_block_needed(done, rows)) is None:
+        blocks.write(folder, *next(new_blocks))
+        done = blocks.update_tallies(folder, done)
+        report(blocks.total(done))
     return pd.concat([blocks.read(blocks.block_file(folder, number)) for number in range(last + 1)], ignore_index=True)
 
 

@@ -52,13 +52,8 @@ def partition(
     """
     rng = np.random.default_rng([seed, 0, 1])  # Three words: the blocks of a search use two.
     solved = database[database["score"] == task.SUCCESS].sample(frac=1.0, random_state=rng)
-    subject = {name: source.stratum(name).subject for name in source.names}
-    subjects = sorted(set(subject.values()))
-    unseen_subjects = set(rng.choice(subjects, sizes.subjects, replace=False)) if by_subject else set()
-    others = [name for name in source.names if subject[name] not in unseen_subjects]
-    unseen_reaches = set(rng.choice(others, round(len(others) * sizes.reaches), replace=False))
-    of_subject = solved["reach"].map(subject).isin(unseen_subjects)
-    of_reach = solved["reach"].isin(unseen_reaches)
+    by_unseen_subjects, unseen_reaches = _draw_unseen(source, rng, sizes, by_subject)
+    of_subject, of_reach = solved["reach"].isin(by_unseen_subjects), solved["reach"].isin(unseen_reaches)
     once = solved.drop_duplicates(SETTING)
     seen = once[~of_subject[once.index] & ~of_reach[once.index]]
     parts = {
@@ -71,6 +66,18 @@ def partition(
     held_out = pd.concat([parts["val"], parts["test"]])
     parts["train"] = without_near_equal(solved[~of_subject & ~of_reach], held_out).sort_index()
     return parts
+
+
+def _draw_unseen(
+    source: setting.Source, rng: np.random.Generator, sizes: Sizes, by_subject: bool
+) -> tuple[set[str], set[str]]:
+    """The reaches of the held-out subjects, and the held-out reaches of the other subjects."""
+    subject = {name: source.stratum(name).subject for name in source.names}
+    subjects = sorted(set(subject.values()))
+    unseen = set(rng.choice(subjects, sizes.subjects, replace=False)) if by_subject else set()
+    others = [name for name in source.names if subject[name] not in unseen]
+    unseen_reaches = set(rng.choice(others, round(len(others) * sizes.reaches), replace=False))
+    return set(source.names) - set(others), unseen_reaches
 
 
 def without_near_equal(rows: pd.DataFrame, held_out: pd.DataFrame) -> pd.DataFrame:

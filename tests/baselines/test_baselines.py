@@ -1,4 +1,4 @@
-"""A contract that every installed method keeps, and what EXP and the floors do."""
+"""The contract of every agent that needs no training, and the actions of EXP, REFLEX and the floors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ KINDS: dict[str, Callable[[], Agent]] = {  # The agents of methods that need no 
 
 
 def states(n: int) -> np.ndarray:
-    """Made-up states (n, 48) of hands half closed, between 0.1 and 0.4 m from the bottle."""
+    """States (n, 48) of half-closed hands, 0.1 to 0.4 m from the bottle."""
     rows = np.zeros((n, model.STATE))
     rows[:, :25] = model.half_closed()
     rows[:, 7] = np.linspace(-0.1, -0.4, n)
@@ -35,37 +35,37 @@ def states(n: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_every_agent_keeps_the_contract(name: str):
+def test_every_agent_follows_the_contract(name: str):
     agent = KINDS[name]()
-    shown = states(5)
-    before = shown.copy()
+    batch = states(5)
+    before = batch.copy()
     if name == "exp":
         cast(Privileged, agent).assign(np.arange(5), [Expert(1.2, 0.5)] * 5)
     agent.reset(np.arange(5))
     for _ in range(3):
-        actions = agent.act(shown)
+        actions = agent.act(batch)
         assert actions.shape == (5, 1)
         assert actions.dtype == np.float64
         assert (np.abs(actions) <= 1.0).all()
-    np.testing.assert_array_equal(shown, before)
+    np.testing.assert_array_equal(batch, before)
 
 
-def test_only_exp_is_told_the_experts():
+def test_only_exp_receives_the_experts():
     assert [name for name, make in KINDS.items() if isinstance(make(), Privileged)] == ["exp"]
 
 
-def test_exp_follows_each_rows_expert():
+def test_exp_plays_the_expert_of_each_row():
     agent, row = Exp().agent(0), np.arange(2)
     agent.assign(row, [Expert(1.0, 0.01), Expert(1.5, 0.9)])
     agent.reset(row)
-    shown = states(2)
-    shown[1] = shown[0]
-    np.testing.assert_array_equal(agent.act(shown), [[0.0], [0.0]])
-    # Half closed, still at the first distance: both open, by K (0 - 0.5).
-    np.testing.assert_allclose(agent.act(shown), [[-0.5], [-0.75]])
+    batch = states(2)
+    batch[1] = batch[0]
+    np.testing.assert_array_equal(agent.act(batch), [[0.0], [0.0]])
+    # Half closed, still at the first distance: both experts open with K (0 - 0.5).
+    np.testing.assert_allclose(agent.act(batch), [[-0.5], [-0.75]])
 
 
-def test_a_floor_sends_nothing_and_the_other_uniform_noise():
+def test_nothing_sends_zeros_and_random_sends_uniform_noise():
     assert not Nothing().agent(0).act(states(3)).any()
     noise = Random().agent(0).act(states(4000))
     assert abs(noise.mean()) < 0.04  # 4 sigma of the mean is 0.037.
@@ -74,9 +74,9 @@ def test_a_floor_sends_nothing_and_the_other_uniform_noise():
 
 
 def test_reflex_closes_within_its_distance_and_opens_beyond():
-    shown = states(1)
-    far = float(task.distance(shown)[0])
-    assert Reflex(near=far).agent(0).act(shown)[0, 0] == 1.0
-    assert Reflex(near=0.99 * far).agent(0).act(shown)[0, 0] == -1.0
+    batch = states(1)
+    far = float(task.distance(batch)[0])
+    assert Reflex(near=far).agent(0).act(batch)[0, 0] == 1.0
+    assert Reflex(near=0.99 * far).agent(0).act(batch)[0, 0] == -1.0
     with pytest.raises(BadDistance, match="0 or more"):
         Reflex(near=float("nan"))

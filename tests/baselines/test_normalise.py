@@ -1,4 +1,4 @@
-"""Running scales against numpy's own over the whole stream."""
+"""Running means and variances, compared with NumPy's over the whole stream."""
 
 import numpy as np
 from hypothesis import given
@@ -8,7 +8,7 @@ from baselines.normalise import EPSILON, PRIOR, Moments
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=40))
-def test_moments_are_those_of_all_values_seen(values):
+def test_moments_equal_the_moments_of_all_values(values):
     moments = Moments(1, 1)
     for value in values:
         moments.update(np.array([[value]]))
@@ -18,7 +18,7 @@ def test_moments_are_those_of_all_values_seen(values):
     assert moments.count[0, 0] == PRIOR + len(values) or abs(moments.count[0, 0] - PRIOR - len(values)) < 1e-9
 
 
-def test_agents_have_streams_of_their_own():
+def test_every_agent_has_its_own_stream():
     moments = Moments(2, 1)
     for values in ([1.0, 10.0], [3.0, 10.0]):
         moments.update(np.array(values)[:, None])

@@ -1,4 +1,4 @@
-"""OMEGA: which action it takes of curves made by hand, and with which model it acts."""
+"""OMEGA: the chosen actions for curves made by hand, and the model that it uses."""
 
 from __future__ import annotations
 
@@ -18,113 +18,115 @@ from tests.helpers import fixed_success_model, tiny_benchmark
 
 
 def curves(*points: dict[float, float], elsewhere: float = 0.1) -> np.ndarray:
-    """Curves (N, 51) with these chances at these actions, and another everywhere else."""
-    found = np.full((len(points), len(GRID)), elsewhere)
-    for row, chances in zip(found, points, strict=True):
-        for action, chance in chances.items():
-            row[np.abs(GRID - action).argmin()] = chance
-    return found
+    """Curves (N, 51) with given probabilities at given actions, and `elsewhere` at all others."""
+    rows = np.full((len(points), len(GRID)), elsewhere)
+    for row, probabilities in zip(rows, points, strict=True):
+        for action, probability in probabilities.items():
+            row[np.abs(GRID - action).argmin()] = probability
+    return rows
 
 
-def chosen(chances: dict[float, float], wanted: float, tolerance: float = 0.05) -> float:
-    return float(choose(curves(chances), np.array([wanted]), tolerance)[0])
+def chosen(probabilities: dict[float, float], preferred: float, tolerance: float = 0.05) -> float:
+    return float(choose(curves(probabilities), np.array([preferred]), tolerance)[0])
 
 
 def states(*distances: float) -> np.ndarray:
-    """States (N, 48) of upright hands whose palm centre is so far from the bottle's axis [m]."""
-    found = np.zeros((len(distances), 48))
-    found[:, [3, 10]] = 1.0
-    found[:, 7], found[:, 8] = distances, -0.09  # The palm centre is 0.09 m ahead of the palm.
-    return found
+    """States (N, 48) of upright hands with given distances from palm centre to bottle axis [m]."""
+    rows = np.zeros((len(distances), 48))
+    rows[:, [3, 10]] = 1.0
+    rows[:, 7], rows[:, 8] = distances, -0.09  # The palm centre is 0.09 m ahead of the palm.
+    return rows
 
 
-def agent(likes: float, slope: float = 8.0, tolerance: float = 0.02) -> OmegaAgent:
-    """With a made-up model, for three episodes."""
-    made = OmegaAgent(fixed_success_model.model(likes, slope), tolerance, near=0.1)
-    made.reset(np.arange(3))
-    return made
+def agent(best: float, slope: float = 8.0, tolerance: float = 0.02) -> OmegaAgent:
+    """An agent with a model that predicts the action `best` as the best one, reset for three episodes."""
+    omega = OmegaAgent(fixed_success_model.model(best, slope), tolerance, near=0.1)
+    omega.reset(np.arange(3))
+    return omega
 
 
 def test_the_best_action_is_taken():
-    assert chosen({0.4: 0.9, -0.6: 0.7}, wanted=-1.0) == pytest.approx(0.4)
-    assert chosen({1.0: 0.2}, wanted=-1.0) == 1.0
-    assert chosen({-1.0: 0.2}, wanted=1.0) == -1.0
+    assert chosen({0.4: 0.9, -0.6: 0.7}, preferred=-1.0) == pytest.approx(0.4)
+    assert chosen({1.0: 0.2}, preferred=-1.0) == 1.0
+    assert chosen({-1.0: 0.2}, preferred=1.0) == -1.0
 
 
-def test_of_actions_about_as_good_the_nearest_to_the_wanted():
-    chances = {-0.8: 0.86, 0.2: 0.88, 0.8: 0.9}
-    assert chosen(chances, wanted=-1.0) == pytest.approx(-0.8)
-    assert chosen(chances, wanted=0.12) == pytest.approx(0.2)
-    assert chosen(chances, wanted=0.8) == pytest.approx(0.8)
-    assert chosen(chances, wanted=-1.0, tolerance=0.03) == pytest.approx(0.2)  # 0.86 is no longer about as good.
-    assert chosen(chances, wanted=-1.0, tolerance=0.0) == pytest.approx(0.8)
+def test_of_equally_good_actions_the_nearest_to_the_preferred_one_is_taken():
+    probabilities = {-0.8: 0.86, 0.2: 0.88, 0.8: 0.9}
+    assert chosen(probabilities, preferred=-1.0) == pytest.approx(-0.8)
+    assert chosen(probabilities, preferred=0.12) == pytest.approx(0.2)
+    assert chosen(probabilities, preferred=0.8) == pytest.approx(0.8)
+    assert chosen(probabilities, preferred=-1.0, tolerance=0.03) == pytest.approx(
+        0.2
+    )  # 0.86 is no longer equally good.
+    assert chosen(probabilities, preferred=-1.0, tolerance=0.0) == pytest.approx(0.8)
 
 
-def test_of_two_as_near_the_one_that_opens_more():
-    for away in GRID[26:]:  # Whatever the last bits of the grid's numbers.
-        assert chosen({-away: 0.9, away: 0.9}, wanted=0.0) == pytest.approx(-away)
+def test_of_two_equally_near_actions_the_one_that_opens_more_is_taken():
+    for action in GRID[26:]:  # For any last bits of the numbers of the grid.
+        assert chosen({-action: 0.9, action: 0.9}, preferred=0.0) == pytest.approx(-action)
 
 
-def test_a_flat_curve_says_nothing_and_what_is_wanted_is_done():
-    for wanted in GRID:
-        assert choose(curves({}, elsewhere=0.5), np.array([wanted]), 0.05)[0] == wanted
-        assert choose(curves({1.0: 0.52, -1.0: 0.48}, elsewhere=0.5), np.array([wanted]), 0.05)[0] == wanted
+def test_a_flat_curve_gives_the_preferred_action():
+    for preferred in GRID:
+        assert choose(curves({}, elsewhere=0.5), np.array([preferred]), 0.05)[0] == preferred
+        assert choose(curves({1.0: 0.52, -1.0: 0.48}, elsewhere=0.5), np.array([preferred]), 0.05)[0] == preferred
 
 
-def test_a_hand_far_away_opens_and_a_near_one_goes_on_where_the_model_says_nothing():
-    made = agent(0.4)
-    near, apart = states(0.05, 0.05, 0.05), states(0.11, 0.09, 0.5)
-    np.testing.assert_allclose(made.act(near), 0.4)
-    made._model = fixed_success_model.model(0.4, slope=0.0)  # From now on it says nothing.
-    np.testing.assert_allclose(made.act(apart)[:, 0], [-1.0, 0.4, -1.0])
-    np.testing.assert_allclose(made.act(near)[:, 0], [-1.0, 0.4, -1.0])
+def test_with_flat_curves_a_far_hand_opens_and_a_near_hand_continues():
+    omega = agent(0.4)
+    near, mixed = states(0.05, 0.05, 0.05), states(0.11, 0.09, 0.5)
+    np.testing.assert_allclose(omega.act(near), 0.4)
+    omega._model = fixed_success_model.model(0.4, slope=0.0)  # From now on all curves are flat.
+    np.testing.assert_allclose(omega.act(mixed)[:, 0], [-1.0, 0.4, -1.0])
+    np.testing.assert_allclose(omega.act(near)[:, 0], [-1.0, 0.4, -1.0])
 
 
-def test_what_the_model_says_clearly_is_done_at_any_distance():
+def test_a_clearly_best_action_is_taken_at_any_distance():
     np.testing.assert_allclose(agent(0.4).act(states(0.05, 0.11, 0.5)), 0.4)
 
 
-def test_every_episode_has_its_own_memory_and_begins_without_one():
-    made, near = agent(0.4), states(0.05, 0.05, 0.05)
-    np.testing.assert_allclose(made.act(near), 0.4)
-    made._model = fixed_success_model.model(0.4, slope=0.0)
-    made.reset(np.array([1]))
-    np.testing.assert_allclose(made.act(near)[:, 0], [0.4, -1.0, 0.4])
+def test_every_episode_has_its_own_memory_and_starts_empty():
+    omega, near = agent(0.4), states(0.05, 0.05, 0.05)
+    np.testing.assert_allclose(omega.act(near), 0.4)
+    omega._model = fixed_success_model.model(0.4, slope=0.0)
+    omega.reset(np.array([1]))
+    np.testing.assert_allclose(omega.act(near)[:, 0], [0.4, -1.0, 0.4])
 
 
-def test_an_agents_actions_are_its_own():
-    made, near = agent(0.4), states(0.05, 0.05, 0.05)
-    made.act(near)[:] = 7.0
-    made._model = fixed_success_model.model(0.4, slope=0.0)
-    np.testing.assert_allclose(made.act(near), 0.4)
+def test_changing_returned_actions_does_not_change_the_agent():
+    omega, near = agent(0.4), states(0.05, 0.05, 0.05)
+    omega.act(near)[:] = 7.0
+    omega._model = fixed_success_model.model(0.4, slope=0.0)
+    np.testing.assert_allclose(omega.act(near), 0.4)
 
 
-def test_it_acts_the_same_at_any_batch_size():
+def test_actions_are_equal_at_any_batch_size():
     rng = np.random.default_rng(0)
-    rough = {
+    noisy = {
         name: array + 0.1 * rng.normal(size=array.shape) for name, array in fixed_success_model.arrays(0.4, 1.0).items()
     }
-    model, shown = SuccessModel(rough | {"deviation": np.ones(48)}), rng.normal(size=(5, 40, 48))
+    model, steps = SuccessModel(noisy | {"deviation": np.ones(48)}), rng.normal(size=(5, 40, 48))
     together, alone = OmegaAgent(model, 0.01, 1.0), [OmegaAgent(model, 0.01, 1.0) for _ in range(40)]
-    for now in shown:
-        actions = together.act(now)
+    for rows in steps:
+        actions = together.act(rows)
         assert len(np.unique(actions)) > 3
-        np.testing.assert_array_equal(actions, np.concatenate([one.act(now[[k]]) for k, one in enumerate(alone)]))
+        np.testing.assert_array_equal(actions, np.concatenate([one.act(rows[[k]]) for k, one in enumerate(alone)]))
 
 
-def test_it_says_which_model_it_acts_with_and_refuses_another(tmp_path: Path):
+def test_the_settings_name_the_model_and_another_model_is_refused(tmp_path: Path):
     file = fixed_success_model.write(tmp_path / "model.safetensors", 0.4)
-    made = Omega(model=str(file)).for_source("real")
-    assert made == Omega(model=str(file), sha256=hashing.sha256(file))
-    again = registry.create("omega", registry.settings_of(made))
-    assert again == made
-    np.testing.assert_allclose(made.agent(0).act(states(0.05)), 0.4)
+    omega = Omega(model=str(file)).for_source("real")
+    assert omega == Omega(model=str(file), sha256=hashing.sha256(file))
+    again = registry.create("omega", registry.settings_of(omega))
+    assert again == omega
+    np.testing.assert_allclose(omega.agent(0).act(states(0.05)), 0.4)
     fixed_success_model.write(file, -0.4)
-    with pytest.raises(NoModel, match=f"has the SHA-256 {hashing.sha256(file)}, not {made.sha256}"):
-        made.agent(0)
+    with pytest.raises(NoModel, match=f"has the SHA-256 {hashing.sha256(file)}, not {omega.sha256}"):
+        omega.agent(0)
 
 
-def test_what_it_cannot_act_with_is_told(tmp_path: Path):
+def test_settings_that_are_not_possible_raise(tmp_path: Path):
     with pytest.raises(NoModel, match=r"ships for minjerk reaches.*--model takes the file"):
         Omega().for_source("minjerk")
     with pytest.raises(NoModel, match="No such file"):
@@ -137,10 +139,10 @@ def test_what_it_cannot_act_with_is_told(tmp_path: Path):
         Omega(near=-1.0)
 
 
-def test_a_method_is_made_for_the_reaches_of_its_run(tmp_path: Path):
+def test_a_method_is_created_for_the_reaches_of_its_run(tmp_path: Path):
     file = fixed_success_model.write(tmp_path / "model.safetensors", 0.4)
-    made = registry.create("omega", {"model": str(file)}, "real")
-    assert registry.settings_of(made)["sha256"] == hashing.sha256(file)
+    omega = registry.create("omega", {"model": str(file)}, "real")
+    assert registry.settings_of(omega)["sha256"] == hashing.sha256(file)
     assert registry.create("exp", {}, "real") == registry.create("exp")
     with pytest.raises(registry.BadSettings, match="'omega': there is no success model"):
         registry.create("omega", {}, "minjerk")
@@ -148,7 +150,7 @@ def test_a_method_is_made_for_the_reaches_of_its_run(tmp_path: Path):
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty working folder, with tiny splits of short reaches as the shipped ones."""
+    """An empty working folder; tiny splits of short reaches replace the shipped ones."""
     tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
     yield tmp_path
@@ -157,8 +159,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
     words = ["run", "--method", "omega", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
-    told = complaint(*words, "--reaches", "minjerk")
-    assert "no success model ships for minjerk reaches" in told
+    assert "no success model ships for minjerk reaches" in complaint(*words, "--reaches", "minjerk")
     assert not (here / "runs").exists()
     file = fixed_success_model.write(here / "model.safetensors", 0.4)
     assert main.main([*words, "--model", "model.safetensors", "--json"]) == 0

@@ -1,4 +1,4 @@
-"""The squashed Gaussian against densities worked out elsewhere, and the agent that plays its mean."""
+"""The policy's densities, compared with SciPy and by hand, and the agent that plays the mean."""
 
 import math
 
@@ -15,12 +15,12 @@ def one(number: float) -> torch.Tensor:
     return torch.tensor([[[number]]], dtype=torch.float64)
 
 
-def test_the_density_is_the_gaussians_over_the_slope_of_tanh():
+def test_the_density_is_the_gaussian_density_divided_by_the_slope_of_tanh():
     mean, deviation, noise = 0.3, 0.5, 1.2
     raw = mean + deviation * noise  # 0.9
-    wanted = float(norm.logpdf(raw, mean, deviation)) - math.log(1.0 - math.tanh(raw) ** 2)
-    action, found = policy.sample(one(mean), one(math.log(deviation)), one(noise))
-    assert_close(found, one(wanted))
+    expected = float(norm.logpdf(raw, mean, deviation)) - math.log(1.0 - math.tanh(raw) ** 2)
+    action, actual = policy.sample(one(mean), one(math.log(deviation)), one(noise))
+    assert_close(actual, one(expected))
     assert_close(action, one(math.tanh(0.9)))
 
 
@@ -32,10 +32,10 @@ def test_the_density_integrates_to_one_over_the_actions():
     assert abs(quad(density, -1.0, 1.0)[0] - 1.0) < 1e-6
 
 
-def test_the_density_stays_finite_where_tanh_is_one():
-    found = policy.log_probability(one(50.0), one(0.0), one(0.0))
+def test_the_density_stays_finite_if_tanh_rounds_to_one():
+    actual = policy.log_probability(one(50.0), one(0.0), one(0.0))
     assert_close(
-        found, one(-0.5 * math.log(2 * math.pi) + 2.0 * (50.0 - math.log(2.0)))
+        actual, one(-0.5 * math.log(2 * math.pi) + 2.0 * (50.0 - math.log(2.0)))
     )  # log(1 - tanh^2) ~ 2(log 2 - u)
 
 
@@ -45,11 +45,11 @@ def test_the_deviation_is_kept_within_bounds():
     assert_close(log_std, torch.tensor([[[-20.0], [2.0]]]))
 
 
-def test_the_agent_plays_the_tanh_of_the_mean_of_scaled_and_clipped_states():
+def test_the_agent_scales_and_clips_states_and_plays_the_mean():
     first = np.zeros((48, 1))
     first[0] = 1.0
-    ones, nothing = np.ones((1, 1)), np.zeros((1, 1))
-    layers = [first, nothing, ones, nothing, np.array([[0.5, 9.0]]), np.zeros((1, 2))]
+    ones, zero = np.ones((1, 1)), np.zeros((1, 1))
+    layers = [first, zero, ones, zero, np.array([[0.5, 9.0]]), np.zeros((1, 2))]
     weights = {f"policy.{i}": layer for i, layer in enumerate(layers)}
     agent = policy.MeanAgent(weights | {"mean": np.full(48, 2.0), "deviation": np.full(48, 4.0)})
     states = np.zeros((3, 48))

@@ -1,4 +1,4 @@
-"""Soft actor-critic: targets and losses done by hand, gradients that stay in their networks, and a task it learns."""
+"""Soft actor-critic: targets and losses by hand, separate gradients, and a task with a known solution."""
 
 import math
 
@@ -26,34 +26,34 @@ def agents(*seeds: int) -> Sac:
     return Sac([np.random.default_rng(seed) for seed in seeds])
 
 
-def test_being_cut_off_bootstraps_but_a_fall_does_not():
+def test_a_truncated_episode_bootstraps_but_a_fall_does_not():
     target = sac.action_value_target(column(1.0, 1.0), column(1.0, 0.0), column(4.0, 4.0), discount=0.5)
     assert_close(target, column(3.0, 1.0))
 
 
-def test_the_value_of_a_state_is_soft():
+def test_the_value_target_subtracts_the_log_density():
     assert_close(sac.value_target(column(3.0, 3.0), column(-2.0, 0.5)), column(5.0, 2.5))
 
 
 def test_losses_by_hand():
     assert_close(sac.squared_error(column(1.0, 5.0), column(2.0, 2.0)), torch.tensor([5.0]))
-    found = sac.policy_loss(column(2.0, 4.0), column(1.0, 1.0), column(1.0, 0.0), column(0.0, 2.0))
-    assert_close(found, torch.tensor([(1 - 2 + 0.001 + 1 - 4 + 0.004) / 2]))
+    actual = sac.policy_loss(column(2.0, 4.0), column(1.0, 1.0), column(1.0, 0.0), column(0.0, 2.0))
+    assert_close(actual, torch.tensor([(1 - 2 + 0.001 + 1 - 4 + 0.004) / 2]))
 
 
 @pytest.mark.parametrize(("loss", "network"), [(0, "action_value"), (1, "value"), (2, "policy")])
-def test_each_loss_moves_its_own_network_alone(loss, network):
+def test_the_gradient_of_each_loss_reaches_only_its_network(loss, network):
     learner = agents(0)
     learner.losses(batch(np.random.default_rng(1), 1), torch.zeros(1, 4, 1))[loss, 0].backward()
-    moved = {
+    reached = {
         name: any(p.grad is not None and p.grad.any() for p in getattr(learner, name).parameters)
         for name in ("policy", "action_value", "value")
     }
-    assert moved == {name: name == network for name in moved}
+    assert reached == {name: name == network for name in reached}
 
 
 def test_the_policys_gradient_goes_through_the_action():
-    """With Q(s, a) = -(a - 0.5)^2 the policy's mean comes to the action that is best, less what entropy asks for."""
+    """With Q(s, a) = -100 (a - 0.5)^2 and constant entropy, the policy's action converges to 0.5."""
     mean = torch.zeros(1, 1, 1, requires_grad=True)
     for _ in range(400):
         action = mean.tanh()
@@ -63,27 +63,27 @@ def test_the_policys_gradient_goes_through_the_action():
     assert_close(mean.tanh(), column(0.5), atol=1e-3, rtol=0.0)
 
 
-def test_seeds_together_learn_what_each_learns_alone():
-    """The products are summed in another order, so the last bits may differ: 1e-4 after ten updates."""
+def test_seeds_trained_together_equal_seeds_trained_alone():
+    """Sums have another order, so the last bits may differ: by 1e-4 after ten updates."""
     together, alone = agents(3, 4), agents(4)
     rng = np.random.default_rng(0)
     for _ in range(10):
         both, noise = batch(rng, 2), torch.tensor(rng.normal(size=(2, 4, 1)), dtype=torch.float32)
         together.update(both, noise)
         alone.update(Batch(*(getattr(both, name)[1:] for name in Batch.__slots__)), noise[1:])
-    for found, wanted in zip(together.trained_parameters, alone.trained_parameters, strict=True):
-        assert_close(found[1:], wanted, atol=1e-4, rtol=1e-3)
+    for actual, expected in zip(together.trained_parameters, alone.trained_parameters, strict=True):
+        assert_close(actual[1:], expected, atol=1e-4, rtol=1e-3)
 
 
 def test_the_target_follows_the_value_by_the_polyak_coefficient():
     learner = agents(0)
     before = learner.target.parameters[0].clone()
     learner.update(batch(np.random.default_rng(1), 1), torch.zeros(1, 4, 1))
-    wanted = before + 0.01 * (learner.value.parameters[0].detach() - before)
-    assert_close(learner.target.parameters[0], wanted)
+    expected = before + 0.01 * (learner.value.parameters[0].detach() - before)
+    assert_close(learner.target.parameters[0], expected)
 
 
-def test_what_was_saved_goes_on_bit_for_bit():
+def test_a_restored_learner_continues_bit_for_bit():
     first, second = agents(0, 1), agents(7, 8)
     rng = np.random.default_rng(2)
     for _ in range(3):
@@ -96,10 +96,11 @@ def test_what_was_saved_goes_on_bit_for_bit():
 
 
 @pytest.mark.slow
-def test_sac_learns_a_bandit_whose_answer_is_known():
-    """Rewards 20 a s on actions a in states s = -1 or 1, episodes of one step.
+def test_sac_solves_a_bandit_with_a_known_solution():
+    """Episodes of one step with reward 20 a s for action a in state s = -1 or 1.
 
-    Then Q = 20 a s, and the best policy's density grows as exp(20 a s): its mean is s (coth 20 - 1/20) = 0.95 s.
+    Then Q = 20 a s, and the optimal policy's density is proportional to exp(20 a s): its mean is
+    s (coth 20 - 1/20) = 0.95 s.
     """
     learner, rng = agents(0, 1), np.random.default_rng(0)
     for _ in range(3000):
@@ -113,7 +114,7 @@ def test_sac_learns_a_bandit_whose_answer_is_known():
     states = torch.zeros(2, 1000, 48)
     states[:, 500:, 0], states[:, :500, 0] = 1.0, -1.0
     played = learner.act(states, torch.tensor(rng.normal(size=(2, 1000, 1)), dtype=torch.float32))
-    wanted = 1 / math.tanh(20) - 1 / 20
+    expected = 1 / math.tanh(20) - 1 / 20
     for agent in range(2):
-        assert abs(played[agent, 500:].mean() - wanted) < 0.05
-        assert abs(played[agent, :500].mean() + wanted) < 0.05
+        assert abs(played[agent, 500:].mean() - expected) < 0.05
+        assert abs(played[agent, :500].mean() + expected) < 0.05

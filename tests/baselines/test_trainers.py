@@ -1,4 +1,4 @@
-"""A contract that the trainers of all baselines keep: exact resuming, seeds of their own, weights that act."""
+"""The contract of all trainers: exact resuming, independent seeds, and weights that act."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ KINDS = ("rl", "rlil", "bc")
 
 
 @pytest.fixture(autouse=True)
-def brief_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Epochs of 80 frames, or 5 updates of cloning."""
+def short_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shortens epochs to 80 frames, or to 5 updates of BC."""
     monkeypatch.setattr(cycle, "FRAMES", 80)
     monkeypatch.setattr("baselines.bc.STEPS", 5)
 
@@ -38,7 +38,7 @@ def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_restored_trainer_goes_on_bit_for_bit(kind: str, tmp_path: Path):
+def test_a_restored_trainer_continues_bit_for_bit(kind: str, tmp_path: Path):
     first, journals = trainer(kind, tmp_path), []
     for _ in range(2):
         first.advance()
@@ -48,68 +48,68 @@ def test_a_restored_trainer_goes_on_bit_for_bit(kind: str, tmp_path: Path):
     assert second.epoch == 2
     for _ in range(2):
         assert first.advance() == second.advance()
-    one, other = ({**each.state(), **each.journal()} for each in (first, second))
-    assert one.keys() == other.keys()
-    for name, array in one.items():
-        np.testing.assert_array_equal(array, other[name], err_msg=name)
+    arrays, restored = ({**one.state(), **one.journal()} for one in (first, second))
+    assert arrays.keys() == restored.keys()
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(array, restored[name], err_msg=name)
 
 
 @pytest.mark.parametrize("kind", ["rl", "rlil"])
-def test_a_shorter_training_is_the_first_part_of_a_longer_one(kind: str, tmp_path: Path):
+def test_a_short_training_equals_the_first_epochs_of_a_long_one(kind: str, tmp_path: Path):
     short, long = (trainer(kind, tmp_path, schedule=Schedule(epochs, 60, 1)) for epochs in (2, 7))
     for _ in range(2):
         assert short.advance() == long.advance()
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_learning_does_not_depend_on_the_number_of_threads(kind: str, tmp_path: Path):
-    before, notes = torch.get_num_threads(), []
+def test_training_does_not_depend_on_the_number_of_threads(kind: str, tmp_path: Path):
+    before, metrics = torch.get_num_threads(), []
     try:
         for threads in (1, 3):
             torch.set_num_threads(threads)
-            made = trainer(kind, tmp_path)
-            notes.append([made.advance() for _ in range(2)])
+            learner = trainer(kind, tmp_path)
+            metrics.append([learner.advance() for _ in range(2)])
     finally:
         torch.set_num_threads(before)
-    assert notes[0] == notes[1]
+    assert metrics[0] == metrics[1]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_equal_seeds_learn_equally_and_others_do_not(kind: str, tmp_path: Path):
+def test_equal_seeds_train_equally_and_other_seeds_do_not(kind: str, tmp_path: Path):
     first, second = trainer(kind, tmp_path), trainer(kind, tmp_path)
-    notes = [first.advance() for _ in range(2)]
-    assert notes == [second.advance() for _ in range(2)]
+    metrics = [first.advance() for _ in range(2)]
+    assert metrics == [second.advance() for _ in range(2)]
     one, other = first.weights()
     assert any((one[name] != other[name]).any() for name in one)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_seed_learns_beside_others_what_it_learns_alone(kind: str, tmp_path: Path):
-    """Up to the order in which a product is summed, which physics and Adam's steps blow up: see the losses.
+def test_a_seed_trains_equally_alone_and_with_other_seeds(kind: str, tmp_path: Path):
+    """The order of sums differs, and physics and Adam amplify the difference, so only the losses are compared.
 
-    `test_sac.py` compares the weights, where there is no physics.
+    `test_sac.py` compares the weights, without physics.
     """
     schedule = Schedule(epochs=4, warm_start=150, period=1)
     together, alone = trainer(kind, tmp_path, (0, 1), schedule), trainer(kind, tmp_path, (1,), schedule)
     _ = together.advance(), alone.advance()
-    (other, found), (wanted,) = together.advance(), alone.advance()
-    assert found == pytest.approx(wanted, rel=1e-2)
-    assert other != pytest.approx(wanted, rel=1e-2)
+    (other_seed, actual), (expected,) = together.advance(), alone.advance()
+    assert actual == pytest.approx(expected, rel=1e-2)
+    assert other_seed != pytest.approx(expected, rel=1e-2)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_weights_act(kind: str, tmp_path: Path):
-    made = trainer(kind, tmp_path)
-    made.advance()
-    for weights in made.weights():
+def test_the_weights_give_agents_that_act(kind: str, tmp_path: Path):
+    learner = trainer(kind, tmp_path)
+    learner.advance()
+    for weights in learner.weights():
         actions = MeanAgent(weights).act(np.random.default_rng(0).normal(size=(3, 48)))
         assert actions.shape == (3, 1)
         assert (np.abs(actions) <= 1.0).all()
 
 
-def test_updates_begin_after_the_warm_start(tmp_path: Path):
-    made = trainer("rl", tmp_path)
-    (first, _), (second, _) = made.advance(), made.advance()
+def test_updates_start_after_the_warm_start(tmp_path: Path):
+    learner = trainer("rl", tmp_path)
+    (first, _), (second, _) = learner.advance(), learner.advance()
     assert first["frames"] == 80
     assert second["frames"] == 160
     assert "value_loss" in first
@@ -121,13 +121,13 @@ def test_updates_begin_after_the_warm_start(tmp_path: Path):
 
 
 def test_the_imitation_loss_by_hand():
-    found = imitation_loss(torch.tensor([[[0.0], [100.0]]]), torch.tensor([[[0.5], [-1.0]]]))
-    torch.testing.assert_close(found, torch.tensor([(0.25 + 4.0) / 2]))
+    actual = imitation_loss(torch.tensor([[[0.0], [100.0]]]), torch.tensor([[[0.5], [-1.0]]]))
+    torch.testing.assert_close(actual, torch.tensor([(0.25 + 4.0) / 2]))
 
 
 @pytest.mark.slow
 def test_behaviour_cloning_recovers_an_expert(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Demonstrations of one expert on five settings: a thousand updates bring actions within 0.1 of its own."""
+    """After a thousand updates on one expert's demonstrations, the actions differ by less than 0.1 (RMS)."""
     monkeypatch.setattr("baselines.bc.STEPS", 250)
     demos = load(Track(SOURCE, CASES, tmp_path, threads=1))
     cloning = Cloning(demos, [0])

@@ -1,4 +1,4 @@
-"""Episodes as a Minari data set: what Minari loads is what was played, and something can be learned from it."""
+"""Minari data sets: Minari loads the played episodes exactly, and a policy can learn from them."""
 
 from __future__ import annotations
 
@@ -35,25 +35,25 @@ NAME = "dextron/brief-v0"
 
 
 def write(into: Path, players: list[minari_export.Player], split: Split = SPLIT, rows: int = 3, **options):
-    """Exports made-up reaches, and loads what Minari finds."""
+    """Exports episodes on short reaches, and loads them with Minari."""
     return minari.MinariDataset(
         minari_export.Export(NAME, split, rows, players).write(SOURCE, into, **options) / "data"
     )
 
 
-def test_minari_loads_what_was_played_to_the_last_bit(tmp_path: Path):
+def test_minari_loads_the_played_episodes_bit_for_bit(tmp_path: Path):
     loaded = write(tmp_path, [EXPERT, STILL], rows=2)
     played = [episode for player in (EXPERT, STILL) for _, episode in sorted(dict(play(player, 2)).items())]
     assert loaded.total_episodes == len(played) == 4
     assert loaded.total_steps == sum(len(episode.actions) for episode in played)
     for stored, episode in zip(loaded.iterate_episodes(), played, strict=True):
-        for kept, own in (
+        for loaded_array, array in (
             (stored.observations, episode.states),
             (stored.actions, episode.actions),
             (stored.rewards, episode.rewards),
         ):
-            assert kept.dtype == np.float64
-            np.testing.assert_array_equal(kept, own)
+            assert loaded_array.dtype == np.float64
+            np.testing.assert_array_equal(loaded_array, array)
         assert (stored.terminations[-1], stored.truncations[-1]) == (episode.terminated, episode.truncated)
         assert not stored.terminations[:-1].any()
         assert not stored.truncations[:-1].any()
@@ -63,19 +63,19 @@ def play(player: minari_export.Player, rows: int):
     return rollout(player.agent, SOURCE, CASES[:rows], threads=1)
 
 
-def test_episodes_say_how_they_can_be_played_again(tmp_path: Path):
+def test_the_metadata_of_an_episode_is_enough_to_replay_it(tmp_path: Path):
     loaded = write(tmp_path, [EXPERT])
-    for stored, told in zip(loaded, loaded.storage.get_episode_metadata(range(3)), strict=True):
+    for stored, metadata in zip(loaded, loaded.storage.get_episode_metadata(range(3)), strict=True):
         env = GraspEnv(SOURCE)
-        env.reset(options={"setting": Setting(**told["setting"])})
+        env.reset(options={"setting": Setting(**metadata["setting"])})
         steps = [env.step(action) for action in stored.actions]
         np.testing.assert_array_equal([step[0] for step in steps], stored.observations[1:])
-        assert told["return"] == stored.rewards.sum()
-        assert told["is_success"] == (told["return"] == 20.0)
-        assert (told["player"], told["row"]) == ("expert", stored.id)
+        assert metadata["return"] == stored.rewards.sum()
+        assert metadata["is_success"] == (metadata["return"] == 20.0)
+        assert (metadata["player"], metadata["row"]) == ("expert", stored.id)
 
 
-def test_the_data_set_says_where_it_is_from(tmp_path: Path):
+def test_the_data_set_has_split_players_and_provenance(tmp_path: Path):
     loaded = write(tmp_path, [EXPERT, STILL])
     about = loaded.storage.metadata
     assert about["dextron_bench"]["split"] == {"reaches": "synthetic", "name": "train", "digest": "5a5a", "rows": 3}
@@ -91,37 +91,35 @@ def test_the_data_set_says_where_it_is_from(tmp_path: Path):
     assert env.observation_space == loaded.observation_space
 
 
-def test_minari_finds_it_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_minari_finds_the_data_set_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     write(tmp_path, [STILL], rows=1)
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     assert minari.load_dataset(NAME).total_episodes == 1
     assert NAME in minari.list_local_datasets()
 
 
-def test_nothing_is_written_elsewhere_and_threads_change_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_nothing_else_is_written_and_threads_change_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.delenv("MINARI_DATASETS_PATH", raising=False)
     write(tmp_path / "a", [EXPERT], threads=1)
     write(tmp_path / "b", [EXPERT], threads=2)
-    assert sorted(found.name for found in tmp_path.iterdir()) == ["a", "b"]
-    assert [found.name for found in (tmp_path / "a" / "dextron").iterdir()] == ["brief-v0"]
-    files = [found for found in (tmp_path / "a").rglob("*.*") if found.is_file() and found.parent.name != "data"]
-    assert len(files) == 6  # For each episode its arrays and its metadata.
-    assert all(
-        found.read_bytes() == (tmp_path / "b" / found.relative_to(tmp_path / "a")).read_bytes() for found in files
-    )
+    assert sorted(folder.name for folder in tmp_path.iterdir()) == ["a", "b"]
+    assert [folder.name for folder in (tmp_path / "a" / "dextron").iterdir()] == ["brief-v0"]
+    files = [file for file in (tmp_path / "a").rglob("*.*") if file.is_file() and file.parent.name != "data"]
+    assert len(files) == 6  # Two files for each episode: arrays and metadata.
+    assert all(file.read_bytes() == (tmp_path / "b" / file.relative_to(tmp_path / "a")).read_bytes() for file in files)
 
 
-def test_what_cannot_be_exported_is_told_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    class Mad(ExpertAgent):
+def test_a_failed_export_raises_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    class SendsNan(ExpertAgent):
         def act(self, states: np.ndarray) -> np.ndarray:
             return np.full((len(states), 1), np.nan)
 
-    with pytest.raises(minari_export.BadExport, match=r"mad failed in row 0 of 'train': action is nan"):
-        write(tmp_path, [minari_export.Player("mad", Mad())])
+    with pytest.raises(minari_export.BadExport, match=r"nan failed in row 0 of 'train': action is nan"):
+        write(tmp_path, [minari_export.Player("nan", SendsNan())])
     assert not list(tmp_path.rglob("*brief*"))
     write(tmp_path, [STILL], rows=1)
-    with pytest.raises(minari_export.BadExport, match="is there already; remove it, or choose another --name"):
+    with pytest.raises(minari_export.BadExport, match="already exists; remove it, or choose another --name"):
         write(tmp_path, [STILL], rows=1)
     for name in ("../up-v0", "brief", "a b-v0", "/brief-v0"):
         with pytest.raises(minari_export.BadExport, match="names no data set"):
@@ -133,30 +131,30 @@ def test_what_cannot_be_exported_is_told_and_leaves_nothing(tmp_path: Path, monk
         write(tmp_path / "b", [STILL])
 
 
-def test_a_policy_fitted_to_it_beats_the_mean_action_on_episodes_held_out(tmp_path: Path):
+def test_a_policy_learned_from_the_data_set_beats_the_mean_action_on_other_episodes(tmp_path: Path):
     rng = np.random.default_rng(0)
     cases = tuple(Case(SOURCE.sample(rng), Expert(1.2, 0.4), 0.0) for _ in range(20))
     loaded = write(tmp_path, [EXPERT], Split("train", "synthetic", cases, "5a5a"), len(cases))
-    learned, held = minari.split_dataset(loaded, sizes=[15, 5], seed=0)
-    (x, y), (seen, wanted) = transitions(learned), transitions(held)
+    train, held_out = minari.split_dataset(loaded, sizes=[15, 5], seed=0)
+    (x, y), (test_x, test_y) = transitions(train), transitions(held_out)
     mean, deviation = x.mean(0), x.std(0) + 1e-6
-    policy = fitted((x - mean) / deviation, y)
+    policy = fit((x - mean) / deviation, y)
     with torch.no_grad():
-        error = (policy((seen - mean) / deviation) - wanted).square().mean().item()
-    blind = (y.mean() - wanted).square().mean().item()
-    assert error < 0.4 * blind
+        error = (policy((test_x - mean) / deviation) - test_y).square().mean().item()
+    constant = (y.mean() - test_y).square().mean().item()
+    assert error < 0.4 * constant
 
 
 def transitions(loaded) -> tuple[torch.Tensor, torch.Tensor]:
-    """States (N, 48) and actions (N, 1) of all its episodes."""
+    """States (N, 48) and actions (N, 1) of all episodes."""
     episodes = list(loaded.iterate_episodes())
     states = np.concatenate([episode.observations[:-1] for episode in episodes])
     actions = np.concatenate([episode.actions for episode in episodes])
     return torch.tensor(states).float(), torch.tensor(actions).float()
 
 
-def fitted(x: torch.Tensor, y: torch.Tensor) -> torch.nn.Module:
-    """A small policy after 300 steps of Adam."""
+def fit(x: torch.Tensor, y: torch.Tensor) -> torch.nn.Module:
+    """A small policy, trained for 300 steps of Adam."""
     torch.manual_seed(0)
     policy = torch.nn.Sequential(torch.nn.Linear(48, 32), torch.nn.Tanh(), torch.nn.Linear(32, 1))
     adam = torch.optim.Adam(policy.parameters(), lr=3e-3)
@@ -171,7 +169,7 @@ def fitted(x: torch.Tensor, y: torch.Tensor) -> torch.nn.Module:
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty working folder in the tiny world."""
+    """An empty working folder with the tiny benchmark installed."""
     tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.setattr("baselines.bc.STEPS", 2)
     monkeypatch.chdir(tmp_path)
@@ -182,10 +180,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
     words = ["data", "export", "--into", "sets", "--split", "test"]
     assert main.main([*words, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["name"], told["episodes"], told["solved"]) == ("dextron/synthetic-test-experts-v0", 2, 2)
-    assert told["folder"] == "sets/dextron/synthetic-test-experts-v0"
-    assert "is there already" in complaint(*words)
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["name"], summary["episodes"], summary["solved"]) == ("dextron/synthetic-test-experts-v0", 2, 2)
+    assert summary["folder"] == "sets/dextron/synthetic-test-experts-v0"
+    assert "already exists" in complaint(*words)
     assert "no data set" in complaint(*words, "--name", "mine")
     run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
     assert main.main(run) == 0

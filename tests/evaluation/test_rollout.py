@@ -1,4 +1,4 @@
-"""The evaluation loop: every case once, whatever the slots, and faults that stay in their own episode."""
+"""The evaluation loop: every case is played once for any number of slots, and a fault fails one episode only."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ CASES = [Case(Setting(SOURCE.names[i], 0.0, 0.0, 0.0), Expert(2.0, d_c), 0.0) fo
 
 
 class Sends:
-    """Sends one value, or what a function of the call's number gives, to every episode."""
+    """Sends one value, or the value of a function of the number of calls, to every episode."""
 
     def __init__(self, value):
         self.value, self.calls, self.resets = value, -1, []
@@ -44,7 +44,7 @@ def test_every_case_is_played_once_and_equally_for_any_number_of_slots():
         np.testing.assert_array_equal(episode.rewards, other.rewards)
 
 
-def test_shapes_of_an_episode_and_how_it_ends():
+def test_the_shapes_and_the_end_of_an_episode():
     episode = play(Sends(0.0))[0]
     steps = len(episode.rewards)
     assert episode.states.shape == (steps + 1, 48)
@@ -53,7 +53,7 @@ def test_shapes_of_an_episode_and_how_it_ends():
     assert episode.failure == ""
 
 
-def test_the_agent_is_told_which_rows_begin():
+def test_reset_names_the_rows_that_begin():
     agent = Sends(0.0)
     play(agent, slots=2)
     assert agent.resets[0] == [0, 1]
@@ -65,26 +65,26 @@ def test_the_agent_is_told_which_rows_begin():
     ("value", "reason"),
     [(np.nan, "action is nan at step 0"), (np.inf, "action is inf at step 0"), (1.5, "action 1.5 is outside [-1, 1]")],
 )
-def test_a_faulty_action_fails_the_episode_by_name(value, reason):
+def test_an_invalid_action_fails_the_episode_and_is_named(value, reason):
     episodes = play(Sends(value))
     assert all(episode.failure.startswith(reason) for episode in episodes.values())
     assert [episode.score for episode in episodes.values()] == [0.0, 0.0, 0.0]
 
 
-def test_a_fault_leaves_the_other_episodes_alone():
-    class OneBreaks(ExpertAgent):
+def test_a_fault_does_not_change_other_episodes():
+    class FailsInRow1(ExpertAgent):
         def act(self, states):
             actions = super().act(states)
             actions[1] = np.nan
             return actions
 
-    broken, sound = play(OneBreaks()), play(ExpertAgent())
-    assert broken[1].failure
+    failed, expected = play(FailsInRow1()), play(ExpertAgent())
+    assert failed[1].failure
     for index in (0, 2):
-        np.testing.assert_array_equal(broken[index].states, sound[index].states)
+        np.testing.assert_array_equal(failed[index].states, expected[index].states)
 
 
-def test_a_fault_in_a_later_step_says_when():
+def test_a_fault_in_a_later_step_names_the_step():
     episode = play(Sends(lambda call: 0.0 if call < 3 else -2.0), CASES[:1])[0]
     assert episode.failure == "action -2 is outside [-1, 1] at step 3"
     assert len(episode.actions) == 3
@@ -99,19 +99,19 @@ def test_actions_of_the_wrong_shape_end_the_evaluation():
         play(Flat(0.0))
 
 
-def test_the_agent_cannot_change_the_states_it_is_shown():
-    class Meddles(Sends):
+def test_the_agent_cannot_change_the_recorded_states():
+    class ChangesStates(Sends):
         def act(self, states):
             states[:] = 7.0
             return super().act(states)
 
-    np.testing.assert_array_equal(play(Meddles(0.0))[0].states, play(Sends(0.0))[0].states)
+    np.testing.assert_array_equal(play(ChangesStates(0.0))[0].states, play(Sends(0.0))[0].states)
 
 
 def test_no_cases_give_no_episodes():
     assert play(Sends(0.0), []) == {}
 
 
-def test_what_a_fault_is_called():
+def test_descriptions_of_faults():
     assert describe_fault(-1.01) == "action -1.01 is outside [-1, 1]"
     assert describe_fault(-np.inf) == "action is -inf"

@@ -1,4 +1,4 @@
-"""Experts that share an opening must fare exactly as if each had played alone."""
+"""Experts that are played together have exactly the outcomes of experts played alone."""
 
 import numpy as np
 import pytest
@@ -13,10 +13,10 @@ SOURCE = MinjerkSource()
 CRITICALS = np.array([0.12, 0.95, 0.30, 0.12, 0.02])
 
 
-def ask(numbers: range, criticals: np.ndarray, slots: int, threads: int = 1) -> list[branching.Outcomes]:
-    """Answers for that many minjerk reaches, in order."""
+def play(numbers: range, criticals: np.ndarray, slots: int, threads: int = 1) -> list[branching.Outcomes]:
+    """The outcomes of batches on minjerk reaches, in the order of their numbers."""
     settings = [SOURCE.sample(np.random.default_rng(number)) for number in numbers]
-    batches = [branching.ExpertBatch(SOURCE.path(each), 2.0, criticals) for each in settings]
+    batches = [branching.ExpertBatch(SOURCE.path(one), 2.0, criticals) for one in settings]
     outcomes = dict(branching.play(Engine(slots, threads), batches))
     return [outcomes[number] for number in sorted(outcomes)]
 
@@ -25,7 +25,7 @@ def ask(numbers: range, criticals: np.ndarray, slots: int, threads: int = 1) -> 
 def alone() -> tuple[np.ndarray, np.ndarray]:
     """Returns and lengths (2, 5) of the same experts played one by one."""
     settings = [SOURCE.sample(np.random.default_rng(number)) for number in range(2)]
-    cases = [policies.Case(each, Expert(2.0, float(critical)), 0.0) for each in settings for critical in CRITICALS]
+    cases = [policies.Case(one, Expert(2.0, float(critical)), 0.0) for one in settings for critical in CRITICALS]
     played = dict(rollout(ExpertAgent(), SOURCE, cases, threads=1))
     scores = np.array([played[i].score for i in range(len(cases))])
     lengths = np.array([len(played[i].actions) for i in range(len(cases))])
@@ -33,23 +33,23 @@ def alone() -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(("slots", "threads"), [(5, 1), (7, 2), (64, 2)])
-def test_shared_openings_end_as_experts_played_one_by_one(alone, slots, threads):
-    outcomes = ask(range(2), CRITICALS, slots, threads)
-    np.testing.assert_array_equal([each.returns for each in outcomes], alone[0])
-    np.testing.assert_array_equal([each.lengths for each in outcomes], alone[1])
+def test_experts_played_together_and_one_by_one_have_equal_outcomes(alone, slots, threads):
+    outcomes = play(range(2), CRITICALS, slots, threads)
+    np.testing.assert_array_equal([batch.returns for batch in outcomes], alone[0])
+    np.testing.assert_array_equal([batch.lengths for batch in outcomes], alone[1])
 
 
 def test_outcomes_differ_between_experts(alone):
-    # Else the comparison above would prove nothing: closing at 0.12 grasps, closing at once does not.
+    # The comparison above needs this: closing at 0.12 grasps the bottle, closing at once does not.
     scores = alone[0]
     assert scores[0, 0] > 1
     assert scores[0, 1] == 0
 
 
-def test_equal_experts_fare_equally(alone):
+def test_equal_experts_have_equal_outcomes(alone):
     np.testing.assert_array_equal(alone[0][:, 0], alone[0][:, 3])
 
 
 def test_more_experts_than_slots_are_refused():
     with pytest.raises(ValueError, match="5 experts need as many slots; there are 4"):
-        ask(range(1), CRITICALS, slots=4)
+        play(range(1), CRITICALS, slots=4)

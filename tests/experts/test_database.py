@@ -1,4 +1,4 @@
-"""Expert databases: what is kept, counted and checked, with numbers done by hand."""
+"""Expert databases: kept rows, counts and checks, with numbers computed by hand."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ def saved(draws: pd.DataFrame, tmp_path: Path) -> Path:
     return file
 
 
-def test_only_draws_above_1_are_kept_and_come_back_bit_for_bit(draws: pd.DataFrame, saved: Path):
+def test_only_draws_above_1_are_kept_and_are_loaded_bit_for_bit(draws: pd.DataFrame, saved: Path):
     expected = draws.iloc[[0, 3, 4]].reset_index(drop=True)
     pd.testing.assert_frame_equal(database.load(saved), expected, check_dtype=False, check_exact=True)
 
 
 def test_the_summary_counts_all_draws(draws: pd.DataFrame, tmp_path: Path):
-    file, found = database.save(draws, SOURCE, SEARCH, tmp_path, "experts-brief")
+    file, about = database.save(draws, SOURCE, SEARCH, tmp_path, "experts-brief")
     assert file == tmp_path / "experts-brief.parquet"
-    counts = {name: found[name] for name in ("draws", "settings", "kept", "solved")}
+    counts = {name: about[name] for name in ("draws", "settings", "kept", "solved")}
     assert counts == {"draws": 6, "settings": 2, "kept": 3, "solved": 2}
-    assert found["search"] == {"reaches": "brief", "seed": 7, "experts": 3, "block": 2}
-    assert json.loads(file.with_suffix(".json").read_text()) == json.loads(json.dumps(found))
+    assert about["search"] == {"reaches": "brief", "seed": 7, "experts": 3, "block": 2}
+    assert json.loads(file.with_suffix(".json").read_text()) == json.loads(json.dumps(about))
     assert database.summary(file)["digest"] == database.rows_digest(database.load(file))
 
 
@@ -73,14 +73,14 @@ def test_statistics_by_hand(draws: pd.DataFrame):
         "0.0 to 0.1": (1, 1, 1),
         "0.1 to 0.2": (1, 1, 0),
         "0.3 to 0.4": (2, 1, 1),
-        "0.8 to 0.9": (2, 0, 0),  # The last band has both its ends.
+        "0.8 to 0.9": (2, 0, 0),  # The last band includes both of its ends.
     }
     assert band("duration") == {"3.0 to 4.0": (3, 1, 1), "4.0 to 5.0": (3, 2, 1)}
 
 
-def test_a_digest_knows_rows_order_and_every_bit(draws: pd.DataFrame):
+def test_the_digest_depends_on_the_order_of_rows_and_on_every_bit(draws: pd.DataFrame):
     digest = database.rows_digest(draws)
-    assert database.rows_digest(draws[draws.columns[::-1]]) == digest  # Columns go by name.
+    assert database.rows_digest(draws[draws.columns[::-1]]) == digest  # Columns are sorted by name.
     assert database.rows_digest(draws.iloc[::-1]) != digest
     other = draws.copy()
     other.loc[2, "critical"] = np.nextafter(0.85, 1.0)
@@ -100,19 +100,19 @@ def test_a_cut_file_is_damaged(saved: Path):
     assert "is damaged" in complaint(saved)
 
 
-def test_rows_that_do_not_fit_the_summary_are_told(saved: Path):
+def test_rows_that_do_not_match_the_summary_raise(saved: Path):
     database.load(saved).iloc[1:].to_parquet(saved)
     assert "summary" in complaint(saved)
 
 
 @pytest.mark.parametrize("column", ["reach", "critical"])
-def test_a_missing_column_is_told(saved: Path, column: str):
+def test_a_missing_column_raises(saved: Path, column: str):
     database.load(saved).drop(columns=column).to_parquet(saved)
     complaint(saved)
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "7", "{}", "null"])
-def test_a_damaged_summary_is_told(saved: Path, text: str):
+def test_a_damaged_summary_raises(saved: Path, text: str):
     saved.with_suffix(".json").write_text(text)
     assert "summary" in complaint(saved)
 
@@ -124,7 +124,7 @@ def test_a_missing_file_is_not_damage(saved: Path):
 
 
 @pytest.mark.parametrize("reaches", ["real", "synthetic"])
-def test_the_shipped_databases_are_whole(reaches: str):
+def test_the_shipped_databases_can_be_loaded(reaches: str):
     try:
         rows, _ = database.load_shipped(reaches)
     except FileNotFoundError:

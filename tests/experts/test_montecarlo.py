@@ -1,4 +1,4 @@
-"""The search: the same rows whatever interrupts it, and the distribution that the paper draws from."""
+"""The search: equal rows after any interruption, and the distributions of the paper."""
 
 import os
 import signal
@@ -40,7 +40,7 @@ def test_draws_are_uniform_with_one_expert_in_each_band():
     assert abs(draws["duration_noise"].mean()) < 0.15
 
 
-def test_a_block_depends_on_its_number_and_the_seed_alone():
+def test_a_block_depends_only_on_its_number_and_the_seed():
     first, again = montecarlo.draw(SOURCE, SMALL, 7), montecarlo.draw(SOURCE, SMALL, 7)
     pd.testing.assert_frame_equal(first, again)
     assert not first.equals(montecarlo.draw(SOURCE, SMALL, 8))
@@ -59,22 +59,22 @@ def test_rows_are_the_same_at_any_slots_and_threads_in_shares_and_after_interrup
     pd.testing.assert_frame_equal(search(tmp_path / "whole", rows=3, share=Share(1, 2)), whole)
 
 
-def test_outcomes_are_those_of_a_naive_search(tmp_path):
-    found = search(tmp_path, rows=2)
-    agents = [policies.Expert(gain, critical) for gain, critical in zip(found["gain"], found["critical"], strict=True)]
-    cases = [policies.Case(s, e, 0.0) for s, e in zip(setting.from_frame(found), agents, strict=True)]
+def test_outcomes_equal_the_outcomes_of_experts_played_one_by_one(tmp_path):
+    table = search(tmp_path, rows=2)
+    agents = [policies.Expert(gain, critical) for gain, critical in zip(table["gain"], table["critical"], strict=True)]
+    cases = [policies.Case(s, e, 0.0) for s, e in zip(setting.from_frame(table), agents, strict=True)]
     played = dict(rollout(policies.ExpertAgent(), SOURCE, cases, threads=1))
-    assert found["score"].tolist() == [played[i].score for i in range(len(cases))]
-    assert found["length"].tolist() == [len(played[i].actions) for i in range(len(cases))]
+    assert table["score"].tolist() == [played[i].score for i in range(len(cases))]
+    assert table["length"].tolist() == [len(played[i].actions) for i in range(len(cases))]
 
 
-def test_a_search_stops_with_the_first_blocks_that_reach_the_rows():
+def test_a_search_stops_at_the_first_block_that_reaches_the_rows():
     done = {0: Tally(1, 8, 3, 2), 1: Tally(1, 8, 0, 0), 2: Tally(1, 8, 5, 4), 4: Tally(1, 8, 9, 9)}
     assert [blocks.last_block_needed(done, rows) for rows in (1, 2, 3, 6, 7)] == [0, 0, 2, 2, None]
     assert blocks.total(done) == Tally(4, 32, 17, 15)
 
 
-def test_a_search_goes_on_from_what_a_database_kept(tmp_path):
+def test_a_search_continues_from_the_kept_rows_of_a_database(tmp_path):
     def kept(draws: pd.DataFrame) -> pd.DataFrame:
         return draws[draws["score"] > blocks.KEPT].astype({"length": int}).reset_index(drop=True)
 
@@ -102,13 +102,13 @@ def test_a_damaged_block_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["2/2", "-1/2", "half", "1"])
-def test_shares_that_do_not_exist(text):
+def test_shares_that_do_not_exist_are_refused(text):
     with pytest.raises(montecarlo.BadSearch, match="share"):
         Share.parse(text)
 
 
 @pytest.mark.slow
-def test_killed_at_any_moment_the_command_goes_on_to_the_same_rows(tmp_path):
+def test_a_killed_search_continues_to_the_same_rows(tmp_path):
     words = [sys.executable, "-m", "dextron_bench", "mc", "--reaches", "minjerk", "--rows", "25", "--quiet", "--runs"]
     subprocess.run([*words, str(tmp_path / "whole")], check=True, capture_output=True)
     for delay in (3.0, 5.0, 8.0):

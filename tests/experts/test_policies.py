@@ -1,4 +1,4 @@
-"""Eq. 1 with numbers done by hand."""
+"""Eq. 1 with numbers computed by hand."""
 
 import numpy as np
 
@@ -7,22 +7,22 @@ from dextron_bench.world import model
 
 
 def state(closure: float, distance: float) -> np.ndarray:
-    """One state with every proximal joint at that share of its range and the palm centre so far [m] from the bottle."""
-    made = np.zeros(48)
-    made[3] = made[10] = 1.0
+    """A state (48,) with one closure of all proximal joints, and a distance [m] from palm centre to bottle."""
+    row = np.zeros(48)
+    row[3] = row[10] = 1.0
     joints, closed = model.proximal()
-    made[joints] = closure * closed
-    made[7:10] = [distance, -0.09, 0.1]
-    return made
+    row[joints] = closure * closed
+    row[7:10] = [distance, -0.09, 0.1]
+    return row
 
 
-def test_closes_within_the_critical_share_of_the_first_distance_or_within_three_centimetres():
+def test_experts_close_within_the_critical_distance_or_within_three_centimetres():
     distances, first = np.array([0.10, 0.099, 0.0301, 0.0299]), np.array([0.2, 0.2, 0.2, 0.2])
     critical = np.array([0.5, 0.5, 0.1, 0.1])
     assert policies.is_closing(distances, first, critical).tolist() == [False, True, False, True]
 
 
-def test_law_is_proportional_to_what_is_left_and_clipped():
+def test_closing_speed_is_proportional_to_the_error_and_clipped():
     closures, closing, gain = (
         np.array([0.5, 0.5, 0.9, 0.0]),
         np.array([False, True, False, True]),
@@ -32,7 +32,7 @@ def test_law_is_proportional_to_what_is_left_and_clipped():
     np.testing.assert_allclose(policies.closing_speeds(closures, closing, gain).ravel(), [-0.5, 0.36, -1.0, 1.0])
 
 
-def test_the_agent_sends_0_first_and_measures_by_the_first_distance():
+def test_the_agent_first_sends_0_and_divides_by_the_first_distance():
     agent = policies.ExpertAgent()
     agent.assign(np.array([0, 1]), [policies.Expert(1.0, 0.5), policies.Expert(1.5, 0.2)])
     agent.reset(np.array([0, 1]))

@@ -16,7 +16,7 @@ TRAIN = pd.DataFrame(
     [("train", *tiny_benchmark.SOLVED[0]), ("train", *tiny_benchmark.SOLVED[1])], columns=tiny_benchmark.COLUMNS
 )
 TOY = f"{Path(__file__).with_name('toy_learner.py')}:Toy"
-HOMELY, HEIR = TOY.replace(":Toy", ":Homely"), TOY.replace(":Toy", ":ToyTransfer")
+MINJERK_TOY, TRANSFER = TOY.replace(":Toy", ":MinjerkToy"), TOY.replace(":Toy", ":ToyTransfer")
 TIMES = {"timing.jsonl", "provenance.json"}  # Files that say when and where, so that two runs may differ.
 
 

@@ -1,4 +1,4 @@
-"""Learners made of little numpy: they fit a linear map to experience that they keep, and depend on all they keep."""
+"""Small learners in NumPy: they fit a linear map to their experience, and depend on all of it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from dextron_bench.methods.learners import Arrays, Track, Trainer
 from dextron_bench.world import model
 
 EPOCHS = {"paper": 12, "quick": 5, "smoke": 2}
-FRAMES = 20  # In an epoch.
-WORD = (1 << 64) - 1
+FRAMES = 20  # Per epoch.
+WORD = (1 << 64) - 1  # Mask of 64 bits.
 
 
 class BadRate(ValueError):
@@ -24,7 +24,7 @@ class BadRate(ValueError):
 
 @dataclass(frozen=True)
 class Toy:
-    """Fits a linear map to what a made-up expert did."""
+    """Fits a linear map to the actions of a synthetic expert."""
 
     name: ClassVar[str] = "toy"
     train_source: ClassVar[str] = ""
@@ -36,11 +36,11 @@ class Toy:
     every: int = 2
     """Epochs between checkpoints."""
     spoils: int = 0
-    """Epoch from which the loss of the second seed is not a number; 0 is never."""
+    """From this epoch on, the loss of the last seed is NaN; 0 means never."""
     breaks: int = 0
-    """Epoch that raises; 0 is never."""
+    """This epoch raises an exception; 0 means never."""
     wait: float = 0.0
-    """Time that an epoch takes at least [s]."""
+    """Minimum time of an epoch [s]."""
 
     def __post_init__(self) -> None:
         if self.rate <= 0.0:
@@ -48,12 +48,12 @@ class Toy:
 
     @property
     def label(self) -> str:
-        """Tells rates apart."""
+        """The name and the learning rate."""
         return f"{self.name}-{self.rate:g}"
 
     @property
     def epochs(self) -> int:
-        """How many there are."""
+        """Number of epochs of the training."""
         return EPOCHS[self.preset]
 
     @property
@@ -63,44 +63,44 @@ class Toy:
 
     @property
     def timing_run(self) -> Toy:
-        """Itself in short."""
+        """The same learner with the shortest preset."""
         return replace(self, preset="smoke")
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
-        """At its start."""
+        """A new trainer."""
         return ToyTrainer(self, len(track.cases), seeds)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> Agent:
-        """Plays the map."""
+        """The agent that plays the map."""
         return Linear(weights["map"], weights["offset"])
 
 
 @dataclass(frozen=True)
-class Homely(Toy):
-    """Trains where minimum-jerk reaches are."""
+class MinjerkToy(Toy):
+    """Always trains on minimum-jerk reaches."""
 
-    name: ClassVar[str] = "homely"
+    name: ClassVar[str] = "minjerk-toy"
     train_source: ClassVar[str] = "minjerk"
 
 
 @dataclass(frozen=True)
 class ToyTransfer:
-    """Takes what Homely learned to other reaches."""
+    """Plays the policy of MinjerkToy on other reaches."""
 
-    name: ClassVar[str] = "toy-heir"
+    name: ClassVar[str] = "toy-transfer"
 
     preset: Literal["paper", "quick", "smoke"] = "paper"
-    """How long the source_policy trains."""
+    """How long the source policy trains."""
 
     @property
     def label(self) -> str:
-        """As the name."""
+        """The name."""
         return self.name
 
     @property
-    def source_policy(self) -> Homely:
-        """Whose policy it is."""
-        return Homely(preset=self.preset)
+    def source_policy(self) -> MinjerkToy:
+        """The learner with the same preset."""
+        return MinjerkToy(preset=self.preset)
 
 
 class Linear:
@@ -110,7 +110,7 @@ class Linear:
         self._map, self._offset = weights, float(offset)
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Has no memory."""
+        """Does nothing: the agent has no memory."""
 
     def act(self, states: np.ndarray) -> np.ndarray:
         """Closing speeds (N, 1) for states (N, 48)."""
@@ -118,33 +118,33 @@ class Linear:
 
 
 class ToyTrainer:
-    """One map and one stream of random numbers a seed; experience grows, and is drawn from."""
+    """Trains one map per seed; each step draws a state from all experience of its seed."""
 
     def __init__(self, toy: Toy, cases: int, seeds: Sequence[int]) -> None:
         self._toy, self.epoch = toy, 0
         self._streams = [np.random.default_rng([seed, cases]) for seed in seeds]
         self._maps = np.zeros((len(seeds), model.STATE))
         self._offsets = np.zeros(len(seeds))
-        self._lived: list[np.ndarray] = [np.zeros((0, model.STATE)) for _ in seeds]
+        self._experience: list[np.ndarray] = [np.zeros((0, model.STATE)) for _ in seeds]
         self._journaled = 0
 
     def advance(self) -> list[dict[str, float]]:
-        """Lives FRAMES states more and takes as many steps downhill on ones drawn from all lived."""
+        """Adds FRAMES states to the experience and takes as many gradient steps."""
         self.epoch += 1
         time.sleep(self._toy.wait)
         if self.epoch == self._toy.breaks:
             raise ZeroDivisionError("toys break")
-        noted = [{"loss": self._learn(k), "frames": float(self.epoch * FRAMES)} for k in range(len(self._streams))]
+        metrics = [{"loss": self._train(k), "frames": float(self.epoch * FRAMES)} for k in range(len(self._streams))]
         if 0 < self._toy.spoils <= self.epoch:
-            noted[-1]["loss"] = float("nan")
-        return noted
+            metrics[-1]["loss"] = float("nan")
+        return metrics
 
-    def _learn(self, k: int) -> float:
+    def _train(self, k: int) -> float:
         rng = self._streams[k]
-        self._lived[k] = np.concatenate([self._lived[k], rng.standard_normal((FRAMES, model.STATE))])
+        self._experience[k] = np.concatenate([self._experience[k], rng.standard_normal((FRAMES, model.STATE))])
         losses = []
         for _ in range(FRAMES):
-            state = self._lived[k][rng.integers(len(self._lived[k]))]
+            state = self._experience[k][rng.integers(len(self._experience[k]))]
             error = np.tanh(state @ self._maps[k] + self._offsets[k]) - np.tanh(state[7] + 0.5)
             self._maps[k] -= self._toy.rate * error * state / model.STATE
             self._offsets[k] -= self._toy.rate * error
@@ -152,40 +152,40 @@ class ToyTrainer:
         return float(np.mean(losses))
 
     def weights(self) -> list[Arrays]:
-        """Map (48,) and offset."""
+        """Map (48,) and offset of each seed."""
         return [{"map": m.copy(), "offset": np.array(o)} for m, o in zip(self._maps, self._offsets, strict=True)]
 
     def state(self) -> Arrays:
-        """All but experience."""
-        streams = np.array([packed(rng) for rng in self._streams])
+        """Everything except the experience."""
+        streams = np.array([pack(rng) for rng in self._streams])
         return {"maps": self._maps, "offsets": self._offsets, "streams": streams, "epoch": np.array(self.epoch)}
 
     def journal(self) -> Arrays:
         """Experience since the last journal."""
-        fresh = np.array([lived[self._journaled :] for lived in self._lived])
-        self._journaled = len(self._lived[0])
-        return {"lived": fresh}
+        recent = np.array([states[self._journaled :] for states in self._experience])
+        self._journaled = len(self._experience[0])
+        return {"experience": recent}
 
     def restore(self, state: Arrays, journals: Iterable[Arrays]) -> None:
-        """Takes the place of the trainer that gave these."""
+        """Continues from another trainer's `state` and journals."""
         self._maps, self._offsets, self.epoch = state["maps"], state["offsets"], int(state["epoch"])
         for rng, words in zip(self._streams, state["streams"], strict=True):
             unpack(rng, words)
-        parts = [each["lived"] for each in journals]
-        self._lived = list(np.concatenate(parts, axis=1))
-        self._journaled = len(self._lived[0])
+        parts = [journal["experience"] for journal in journals]
+        self._experience = list(np.concatenate(parts, axis=1))
+        self._journaled = len(self._experience[0])
 
 
-def packed(rng: np.random.Generator) -> list[np.uint64]:
+def pack(rng: np.random.Generator) -> list[np.uint64]:
     """The state of a PCG64 stream in words of 64 bits."""
-    found = rng.bit_generator.state
-    big = [found["state"]["state"], found["state"]["inc"]]
-    words = [part for number in big for part in (number >> 64, number & WORD)]
-    return [np.uint64(word) for word in (*words, found["has_uint32"], found["uinteger"])]
+    state = rng.bit_generator.state
+    numbers = [state["state"]["state"], state["state"]["inc"]]
+    words = [part for number in numbers for part in (number >> 64, number & WORD)]
+    return [np.uint64(word) for word in (*words, state["has_uint32"], state["uinteger"])]
 
 
 def unpack(rng: np.random.Generator, words: np.ndarray) -> None:
-    """Puts a stream where `packed` found one."""
+    """Restores the state that `pack` returned."""
     a, b, c, d, has, left = map(int, words)
     state = {"state": a << 64 | b, "inc": c << 64 | d}
     rng.bit_generator.state = {"bit_generator": "PCG64", "state": state, "has_uint32": has, "uinteger": left}

@@ -1,4 +1,4 @@
-"""The perceptron whose outputs do not depend on the batch, by hand and against the plain one."""
+"""Perceptron: outputs by hand, compared with float64 layers, and equal for any batch."""
 
 from itertools import pairwise
 
@@ -13,7 +13,7 @@ from dextron_bench.methods.exact import BLOCK, Perceptron, to_integers
 
 def layers(rng: np.random.Generator, *sizes: int) -> list[tuple[np.ndarray, np.ndarray]]:
     pairs = pairwise(sizes)
-    return [(rng.normal(size=(wide, narrow)) / wide**0.5, rng.normal(size=narrow)) for wide, narrow in pairs]
+    return [(rng.normal(size=(before, after)) / before**0.5, rng.normal(size=after)) for before, after in pairs]
 
 
 def test_two_layers_by_hand():
@@ -24,7 +24,7 @@ def test_two_layers_by_hand():
     np.testing.assert_array_equal(network(x), [[2.0], [5.0]])
 
 
-def test_any_part_of_a_batch_in_any_order_gives_the_same_bits():
+def test_outputs_are_bit_equal_in_any_part_of_a_batch():
     rng = np.random.default_rng(1)
     network, x = Perceptron(layers(rng, 48, 256, 256, 2)), rng.normal(size=(3 * BLOCK + 5, 48))
     together = network(x)
@@ -32,45 +32,45 @@ def test_any_part_of_a_batch_in_any_order_gives_the_same_bits():
         assert network(x[rows]).tobytes() == together[rows].tobytes()
 
 
-def test_terms_in_any_order_give_the_same_bits():
-    """Which plain sums of floats do not: that is what may differ between processors."""
+def test_outputs_are_bit_equal_for_any_order_of_terms():
+    """Plain sums of floats are not: their order may differ between processors."""
     rng = np.random.default_rng(2)
     weight, bias, x, order = rng.normal(size=(256, 3)), np.zeros(3), rng.normal(size=(40, 256)), rng.permutation(256)
     assert (x @ weight != x[:, order] @ weight[order]).any()
     assert Perceptron([(weight, bias)])(x).tobytes() == Perceptron([(weight[order], bias)])(x[:, order]).tobytes()
 
 
-def test_it_is_as_close_to_the_plain_network_as_float32_is():
+def test_outputs_are_as_precise_as_float32():
     rng = np.random.default_rng(3)
-    made, x = layers(rng, 48, 256, 256, 2), rng.normal(size=(50, 48))
+    weights, x = layers(rng, 48, 256, 256, 2), rng.normal(size=(50, 48))
     plain = x
-    for i, (weight, bias) in enumerate(made):
+    for i, (weight, bias) in enumerate(weights):
         plain = plain @ weight + bias
         plain = np.maximum(plain, 0.0) if i < 2 else plain
-    np.testing.assert_allclose(Perceptron(made)(x), plain, atol=1e-5)
+    np.testing.assert_allclose(Perceptron(weights)(x), plain, atol=1e-5)
 
 
 @given(arrays(np.float64, (3, 5), elements=st.floats(-1e100, 1e100)), st.integers(4, 26))
-def test_whole_numbers_are_whole_of_few_bits_and_near(x: np.ndarray, bits: int):
-    numbers, units = to_integers(x, bits, axis=1)
-    assert (numbers == np.rint(numbers)).all()
-    assert np.abs(numbers).max() <= 2**bits
-    assert (np.abs(numbers * units - x) <= units / 2).all()
+def test_integers_have_few_bits_and_are_near_the_numbers(x: np.ndarray, bits: int):
+    integers, units = to_integers(x, bits, axis=1)
+    assert (integers == np.rint(integers)).all()
+    assert np.abs(integers).max() <= 2**bits
+    assert (np.abs(integers * units - x) <= units / 2).all()
 
 
-def test_nothing_infinite_comes_of_tiny_numbers_or_none():
+def test_tiny_numbers_and_empty_batches_give_finite_outputs():
     network = Perceptron([(np.full((2, 1), 5e-324), np.zeros(1))])
     np.testing.assert_array_equal(network(np.array([[1e300, 0.0], [0.0, 5e-324]])), [[0.0], [0.0]])
     assert network(np.zeros((0, 2))).shape == (0, 1)
 
 
-def test_a_row_that_is_not_finite_spoils_no_other():
+def test_a_row_that_is_not_finite_does_not_change_other_rows():
     network = Perceptron([(np.eye(2), np.zeros(2))])
-    found = network(np.array([[np.nan, 1.0], [0.5, 0.25]]))
-    assert np.isnan(found[0]).any()
-    np.testing.assert_array_equal(found[1], [0.5, 0.25])
+    outputs = network(np.array([[np.nan, 1.0], [0.5, 0.25]]))
+    assert np.isnan(outputs[0]).any()
+    np.testing.assert_array_equal(outputs[1], [0.5, 0.25])
 
 
-def test_layers_that_do_not_fit_are_told():
+def test_layers_that_do_not_fit_raise():
     with pytest.raises(ValueError, match="do not follow"):
         Perceptron([(np.zeros((2, 3)), np.zeros(3)), (np.zeros((4, 1)), np.zeros(1))])

@@ -1,4 +1,4 @@
-"""Methods by name, module and file; and what is said where there is none."""
+"""Methods by name, module and file; and the messages if there is no such method."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Mine:
 
 @pytest.fixture
 def file(tmp_path: Path) -> Callable[[str], Path]:
-    """Writes the text of a method's file and returns where."""
+    """Writes a method's file with a given text and returns its path."""
 
     def write(text: str) -> Path:
         (tmp_path / "mine.py").write_text(text)
@@ -37,25 +37,25 @@ def file(tmp_path: Path) -> Callable[[str], Path]:
     return write
 
 
-def test_installed_methods_by_name():
+def test_an_installed_method_is_found_by_name():
     assert {"exp", "nothing", "random"} <= set(registry.installed_methods())
     assert registry.find_method("exp") is Exp
     assert registry.describe("exp") == 'Replays the expert that solved each setting (paper, fig. 4a, "EXP").'
 
 
 @pytest.mark.parametrize("name", registry.installed_methods())
-def test_every_installed_method_can_be_made_and_has_plain_settings(name: str):
-    found = registry.create(name)
-    assert found.name == name
-    assert all(isinstance(value, (str, int, float, bool, tuple)) for value in registry.settings_of(found).values())
+def test_every_installed_method_can_be_created_and_has_plain_settings(name: str):
+    method = registry.create(name)
+    assert method.name == name
+    assert all(isinstance(value, (str, int, float, bool, tuple)) for value in registry.settings_of(method).values())
     assert registry.describe(name).endswith(".")
 
 
-def test_by_module():
+def test_a_method_is_found_by_its_module():
     assert registry.find_method("baselines.floors:Nothing") is Nothing
 
 
-def test_by_file_which_is_executed_once(file: Callable[[str], Path]):
+def test_a_method_is_found_by_its_file_which_is_executed_once(file: Callable[[str], Path]):
     place = file(AGENT)
     first, second = registry.find_method(f"{place}:Mine"), registry.find_method(f"{place}:Mine")
     assert first is second
@@ -63,11 +63,11 @@ def test_by_file_which_is_executed_once(file: Callable[[str], Path]):
     assert place.with_suffix(".log").read_text() == "executed\n"
 
 
-def test_the_origin_of_a_file_changes_with_its_content(file: Callable[[str], Path]):
+def test_the_hash_of_a_file_changes_with_its_content(file: Callable[[str], Path]):
     spec = f"{file(AGENT)}:Mine"
     before = registry.code_origin(spec)
     assert before["class"] == "mine.py:Mine"
-    file(AGENT + "# Another thought.\n")
+    file(AGENT + "# A comment.\n")
     assert registry.code_origin(spec)["sha256"] != before["sha256"]
     assert (
         registry.code_origin("exp")
@@ -76,7 +76,7 @@ def test_the_origin_of_a_file_changes_with_its_content(file: Callable[[str], Pat
     )
 
 
-def test_an_unknown_name_lists_the_others():
+def test_an_unknown_name_lists_the_valid_ones():
     with pytest.raises(
         UnknownMethod, match=r"^no method 'xep'; choose from .*exp, .*nothing, .*random.*, or give module"
     ):
@@ -97,7 +97,7 @@ def test_an_unknown_name_lists_the_others():
         ("exec:./agent", "is a command, not a method; choose from"),
     ],
 )
-def test_what_is_no_method_is_named(spec: str, complaint: str):
+def test_a_text_that_names_no_method_raises(spec: str, complaint: str):
     with pytest.raises(UnknownMethod) as caught:
         registry.find_method(spec)
     assert complaint in str(caught.value)
@@ -116,32 +116,32 @@ def test_what_is_no_method_is_named(spec: str, complaint: str):
         ("class Mine:\n    name = 3\n    def agent(self, seed): ...\n", "has the name 3"),
     ],
 )
-def test_a_file_that_fails_says_how(file: Callable[[str], Path], text: str, complaint: str):
+def test_a_file_that_cannot_be_imported_raises(file: Callable[[str], Path], text: str, complaint: str):
     spec = f"{file(text)}:Mine"
-    for _ in range(2):  # A failed import leaves nothing that looks imported.
+    for _ in range(2):  # A failed import leaves no module behind.
         with pytest.raises(UnknownMethod) as caught:
             registry.find_method(spec)
         assert complaint in str(caught.value)
 
 
-def test_a_method_that_cannot_be_made_says_why(file: Callable[[str], Path]):
+def test_a_method_that_cannot_be_created_raises(file: Callable[[str], Path]):
     place = file("class Mine:\n    name = 'mine'\n    def __init__(self, size): ...\n    def agent(self, seed): ...\n")
     with pytest.raises(AgentError, match=r"^making method .* raised TypeError: .*'size'"):
         registry.create(f"{place}:Mine")
 
 
-def test_a_broken_installed_method_is_told_of_in_the_list(monkeypatch: pytest.MonkeyPatch):
+def test_the_description_of_a_broken_installed_method_says_why(monkeypatch: pytest.MonkeyPatch):
     broken = EntryPoints([EntryPoint("broken", "nosuch.module:Agent", loading.GROUP)])
     monkeypatch.setattr(loading, "entry_points", lambda **params: broken.select(**params))
     assert registry.installed_methods() == ("broken",)
     assert registry.describe("broken").startswith("method 'broken' cannot be imported: ModuleNotFoundError")
 
 
-def test_settings_are_the_fields():
+def test_settings_are_the_fields_of_the_dataclass():
     assert registry.settings_of(Random()) == {}
 
 
-def test_equal_seeds_act_equally_and_others_do_not():
+def test_equal_seeds_act_equally_and_other_seeds_do_not():
     states = np.zeros((4, 48))
     first, again, other = (Random().agent(seed).act(states) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)

@@ -1,4 +1,4 @@
-"""Splits keep apart what they promise to, and difficulty is what a scan finds."""
+"""Splits share no held-out reach, subject or setting, and a scan measures how hard each row is."""
 
 import json
 
@@ -21,7 +21,7 @@ SIZES = Sizes(evaluated=20, val=10, open=5, subjects=2, reaches=0.25)
 
 
 class Strata(setting.ReachSource):
-    """Stands in for a source: 32 reaches of 8 subjects, none of which is ever played."""
+    """A source of 32 reaches of 8 subjects; no reach is played."""
 
     def __init__(self) -> None:
         super().__init__("made-up", [])
@@ -64,50 +64,50 @@ def test_sizes_and_only_solved_rows(parts):
     assert all((rows["score"] == 20).all() for rows in parts.values())
 
 
-def test_nothing_leaks(parts):
-    home = pd.concat([parts["train"], parts["val"], parts["test"], parts["unseen-reach"]])
+def test_no_split_shares_settings_reaches_or_subjects_that_it_must_not(parts):
+    others = pd.concat([parts["train"], parts["val"], parts["test"], parts["unseen-reach"]])
     assert len(subjects(parts["unseen-subject"])) == 2
-    assert not subjects(parts["unseen-subject"]) & subjects(home)
+    assert not subjects(parts["unseen-subject"]) & subjects(others)
     seen = pd.concat([parts["train"], parts["val"], parts["test"]])
     assert not set(parts["unseen-reach"]["reach"]) & set(seen["reach"])
     settings = [set(rows[building.SETTING].itertuples(index=False, name=None)) for rows in parts.values()]
-    assert sum(len(each) for each in settings) == len(set.union(*settings))
+    assert sum(map(len, settings)) == len(set.union(*settings))
 
 
-def test_train_keeps_every_expert_of_its_settings_and_the_others_one(parts):
+def test_train_keeps_every_expert_of_a_setting_and_other_splits_keep_one(parts):
     assert (parts["train"].groupby(building.SETTING).size() == 2).all()
     assert (parts["test"].groupby(building.SETTING).size() == 1).all()
 
 
-def test_equal_seeds_give_equal_parts(database, parts):
+def test_equal_seeds_give_equal_splits(database, parts):
     again = building.partition(Strata(), database, 0, SIZES, by_subject=True)
     for name, rows in parts.items():
         pd.testing.assert_frame_equal(rows, again[name])
 
 
-def test_a_database_too_small_says_so(database):
+def test_a_database_that_is_too_small_raises(database):
     with pytest.raises(TooFewRows, match="needs 20 solved settings"):
         building.partition(Strata(), database.head(60), 0, SIZES, by_subject=False)
 
 
 def test_near_equal_settings_are_dropped():
-    held = pd.DataFrame([["a", 0.01, 0.02, 0.5]], columns=building.SETTING)
+    held_out = pd.DataFrame([["a", 0.01, 0.02, 0.5]], columns=building.SETTING)
     rows = pd.DataFrame(
         [
-            ["a", 0.0105, 0.0205, 0.51],  # Near in all three.
+            ["a", 0.0105, 0.0205, 0.51],  # Near-equal in all three numbers.
             ["a", 0.0115, 0.02, 0.5],  # 1.5 mm apart.
             ["a", 0.01, 0.02, 0.53],  # Another duration.
             ["b", 0.01, 0.02, 0.5],  # Another reach.
         ],
         columns=building.SETTING,
     )
-    assert building.without_near_equal(rows, held).index.tolist() == [1, 2, 3]
+    assert building.without_near_equal(rows, held_out).index.tolist() == [1, 2, 3]
 
 
-def test_window_and_best_of_a_scan():
+def test_window_and_best_critical_distance_of_a_scan():
     scores = np.array([[0, 20, 20, 20, 0, 20, 0, 0], [0, 0, 3, 0, 0, 0, 0, 0], np.zeros(8)], float)
     np.testing.assert_allclose(building.success_window(scores), [0.89 * 4 / 8, 0.0, 0.0])
-    # The middles of bands 2 and 2; with nothing anywhere, of the whole range (band 3).
+    # The middle of band 2 twice; without any reward, the middle of the whole range (band 3).
     np.testing.assert_allclose(building.best_critical(scores), 0.01 + 0.89 * np.array([2.5, 2.5, 3.5]) / 8)
 
 
@@ -117,11 +117,11 @@ def test_a_scan_plays_each_row_with_its_own_gain():
     scores = building.scan(source, rows, Engine(6, 1), points=3)
     swapped = building.scan(source, rows.iloc[::-1], Engine(6, 1), points=3)
     np.testing.assert_array_equal(scores, swapped[::-1])
-    assert scores[0, 0] > 1  # Closes at d_c = 0.158, as the paper's expert of this world.
-    assert scores[0, 2] == 0  # Closes at 0.752, long before it comes to the bottle.
+    assert scores[0, 0] > 1  # Closes at d_c = 0.158, like the paper's expert of this environment.
+    assert scores[0, 2] == 0  # Closes at 0.752, long before it reaches the bottle.
 
 
-# `minjerk`, where there is one expert and no offset.
+# `minjerk` has one expert and no offsets.
 
 FEW = building_minjerk.Sizes(train=2, val=1, test=2, scan=2, batch=3)
 
@@ -131,7 +131,7 @@ def minjerk() -> dict[str, pd.DataFrame]:
     return building_minjerk.draw(MinjerkSource(), Engine(8, 1), 0, FEW)
 
 
-def test_minjerk_trains_on_listed_reaches_and_holds_out_further_ones(minjerk):
+def test_minjerk_trains_on_listed_reaches_and_evaluates_on_others(minjerk):
     assert {name: len(rows) for name, rows in minjerk.items()} == {"train": 2, "val": 1, "test": 2}
     reaches = [name for rows in minjerk.values() for name in rows["reach"]]
     assert len(set(reaches)) == 5
@@ -139,7 +139,7 @@ def test_minjerk_trains_on_listed_reaches_and_holds_out_further_ones(minjerk):
     assert [name in listed for name in reaches] == [True] * 2 + [False] * 3
 
 
-def test_minjerk_rows_are_solved_by_its_one_expert_in_a_drawn_order(minjerk):
+def test_the_expert_of_minjerk_solves_all_rows_and_the_order_is_drawn(minjerk):
     source, rows = MinjerkSource(), pd.concat(minjerk.values())
     assert set(zip(rows["gain"], rows["critical"], strict=True)) == {(2.0, 0.15)}
     played = dict(rollout(ExpertAgent(), source, cases_from_frame(rows.assign(window=0.0)), threads=1))
@@ -151,13 +151,13 @@ def test_minjerk_rows_are_solved_by_its_one_expert_in_a_drawn_order(minjerk):
     )
 
 
-def test_unsolved_minjerk_reaches_are_passed_over(monkeypatch):
+def test_unsolved_minjerk_reaches_are_skipped(monkeypatch):
     monkeypatch.setattr(building_minjerk, "EXPERT", policies.Expert(2.0, 0.9))  # Hits the bottle with a closed hand.
-    with pytest.raises(TooFewRows, match="1 solved minjerk reaches are asked for and there are 0"):
+    with pytest.raises(TooFewRows, match="the splits need 1 solved minjerk reaches and there are 0"):
         building_minjerk.first_solved(MinjerkSource(), np.arange(4), 1, Engine(4, 1), batch=2)
 
 
-def test_minjerk_is_written_beside_the_other_sources(tmp_path):
+def test_writing_minjerk_keeps_the_other_sources(tmp_path):
     (tmp_path / "splits.json").write_text('{"real": {}}')
     entry = building_minjerk.build(tmp_path, Engine(8, 1), 0, FEW)
     assert json.loads((tmp_path / "splits.json").read_text()) == {"real": {}, "minjerk": entry}
@@ -168,7 +168,7 @@ def test_minjerk_is_written_beside_the_other_sources(tmp_path):
     assert entry["val"]["digest"] == split_digest(table[table["split"] == "val"])
 
 
-def test_only_minjerk_does_without_a_database(tmp_path, capsys):
+def test_every_source_except_minjerk_needs_a_database(tmp_path, capsys):
     assert main.main(["splits", "--reaches", "synthetic", "--into", str(tmp_path)]) == 2
     assert "splits of synthetic reaches need --database" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

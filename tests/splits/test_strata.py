@@ -1,4 +1,4 @@
-"""Strata are those of the reaches themselves."""
+"""The strata of a split are the strata of its reaches."""
 
 from __future__ import annotations
 
@@ -14,44 +14,44 @@ from dextron_bench.splits.strata import REGION, SUBJECT, by_stratum, start_regio
 
 
 @pytest.mark.parametrize(("reaches", "split"), [(r, s) for r, s in all_splits() if s == "test"])
-def test_strata_are_those_that_the_source_tells(reaches: str, split: str, opened: Callable[[str], Source]):
+def test_strata_equal_the_strata_of_the_source(reaches: str, split: str, opened: Callable[[str], Source]):
     loaded, source = load_split(reaches, split), opened(reaches)
-    told = [source.stratum(case.setting.reach) for case in loaded.cases]
-    expected = [(each.subject, each.ring, each.angle) for each in told]
+    of_rows = [source.stratum(case.setting.reach) for case in loaded.cases]
+    expected = [(stratum.subject, stratum.ring, stratum.angle) for stratum in of_rows]
     assert list(strata(loaded).itertuples(index=False, name=None)) == expected
 
 
-def test_a_recorded_reach_says_by_its_name_whose_it_is():
+def test_the_name_of_a_recorded_reach_gives_subject_and_region():
     """Marker 11 is the third on the third ring of four."""
     split = load_split("real", "test")
     row = next(i for i, case in enumerate(split.cases) if case.setting.reach.endswith("_11"))
-    found = strata(split).iloc[row]
-    assert (found["subject"], found["ring"], found["angle"]) == (split.cases[row].setting.reach[:2], 2, 2)
+    stratum = strata(split).iloc[row]
+    assert (stratum["subject"], stratum["ring"], stratum["angle"]) == (split.cases[row].setting.reach[:2], 2, 2)
 
 
-def test_groups_have_means_over_seeds_and_rows():
-    """Rows 0 and 2 are of one subject: seeds score 20 and 10, then 0 and 20."""
+def test_a_group_has_the_means_over_seeds_and_rows():
+    """Rows 0 and 2 belong to one subject: seed 0 scores 20 and 10, seed 1 scores 0 and 20."""
     rows = pd.DataFrame({"subject": ["x", "y", "x"], "ring": [0, 0, 3], "angle": [1, 1, 2]})
     scores = np.array([[20.0, 4.0, 10.0], [0.0, 4.0, 20.0]])
-    people = by_stratum(scores, rows, SUBJECT)
-    assert people.to_dict("list") == {
+    by_subject = by_stratum(scores, rows, SUBJECT)
+    assert by_subject.to_dict("list") == {
         "subject": ["x", "y"],
         "rows": [2, 1],
         "return": [12.5, 4.0],
         "success": [0.5, 0.0],
     }
-    places = by_stratum(scores, rows, REGION)
-    assert places[["ring", "angle", "rows", "return"]].to_numpy().tolist() == [[0, 1, 2, 7.0], [3, 2, 1, 15.0]]
+    by_region = by_stratum(scores, rows, REGION)
+    assert by_region[["ring", "angle", "rows", "return"]].to_numpy().tolist() == [[0, 1, 2, 7.0], [3, 2, 1, 15.0]]
 
 
 def test_regions_are_numbered_by_ring_then_angle():
     split = load_split("real", "test")
-    found = strata(split)
+    rows = strata(split)
     numbers = start_regions("real", "test", split.digest)
     assert numbers is not None
-    assert numbers.tolist() == [4 * ring + angle for ring, angle in zip(found["ring"], found["angle"], strict=True)]
+    assert numbers.tolist() == [4 * ring + angle for ring, angle in zip(rows["ring"], rows["angle"], strict=True)]
 
 
 @pytest.mark.parametrize(("name", "digest"), [("test", "0" * 64), ("nowhere", "0" * 64)])
-def test_a_split_that_does_not_ship_has_no_strata(name: str, digest: str):
+def test_a_split_that_does_not_ship_has_no_regions(name: str, digest: str):
     assert start_regions("real", name, digest) is None

@@ -1,4 +1,4 @@
-"""Agents in processes of their own: they act as they do here, and what they may not do or cannot is survived."""
+"""Isolated agents: they act as in this process, and forbidden or failing code fails only their episodes."""
 
 from __future__ import annotations
 
@@ -49,24 +49,24 @@ CLOSES = "return np.where(task.distance(states) < 0.06, 1.0, -1.0)[:, None]"
 
 
 @pytest.fixture
-def made(tmp_path: Path) -> Callable[[str], str]:
-    """Writes an agent whose `act` is some line; returns what names it."""
+def agent_spec(tmp_path: Path) -> Callable[[str], str]:
+    """Writes an agent whose `act` is one line; returns its spec."""
 
-    def made(act: str) -> str:
+    def write(act: str) -> str:
         file = tmp_path / "mine.py"
         file.write_text(AGENT.format(act=act))
         return f"{file}:Agent"
 
-    return made
+    return write
 
 
 def play(spec: str, cases: list[Case] = CASES, **limits: float) -> list[Episode]:
     with IsolatedAgent(prepare_launch(spec), limits=Limits(**limits)) as agent:  # pyright: ignore[reportArgumentType]
-        found = dict(rollout(agent, SOURCE, cases, slots=2, threads=1))
-    return [found[index] for index in range(len(cases))]
+        episodes = dict(rollout(agent, SOURCE, cases, slots=2, threads=1))
+    return [episodes[index] for index in range(len(cases))]
 
 
-def test_an_isolated_agent_acts_as_it_does_here(made: Callable[[str], str]):
+def test_an_isolated_agent_acts_as_in_this_process(agent_spec: Callable[[str], str]):
     class Here:
         def reset(self, episodes: np.ndarray) -> None: ...
 
@@ -76,21 +76,27 @@ def test_an_isolated_agent_acts_as_it_does_here(made: Callable[[str], str]):
             return np.where(task.distance(states) < 0.06, 1.0, -1.0)[:, None]
 
     here = dict(rollout(Here(), SOURCE, CASES, slots=2, threads=1))
-    for index, episode in enumerate(play(made(CLOSES))):
+    for index, episode in enumerate(play(agent_spec(CLOSES))):
         np.testing.assert_array_equal(episode.states, here[index].states)
         np.testing.assert_array_equal(episode.actions, here[index].actions)
         assert episode.score == here[index].score
 
 
-def test_installed_methods_and_what_agents_print(made: Callable[[str], str]):
+def test_installed_methods_play_and_agents_may_print(agent_spec: Callable[[str], str]):
     assert [episode.failure for episode in play("nothing")] == [""] * 3
-    assert [episode.failure for episode in play(made(f"print('hello'); {CLOSES}"))] == [""] * 3
+    assert [episode.failure for episode in play(agent_spec(f"print('hello'); {CLOSES}"))] == [""] * 3
 
 
-def test_a_learners_file_can_be_its_agents_too(made: Callable[[str], str]):
+def test_a_file_may_hold_a_learner_and_its_agent(agent_spec: Callable[[str], str]):
     (episode,) = play(
-        made("from dextron_bench.methods.learners import Track; return np.zeros((len(states), 1))"), CASES[:1]
+        agent_spec("from dextron_bench.methods.learners import Track; return np.zeros((len(states), 1))"), CASES[:1]
     )
+    assert episode.failure == ""
+
+
+def test_an_agent_may_import_the_public_names_of_policies(agent_spec: Callable[[str], str]):
+    names = "Agent, Expert, ExpertAgent, Learner, Perceptron, SuccessModel, Trainer, Track"
+    (episode,) = play(agent_spec(f"from dextron_bench import {names}; return np.zeros((len(states), 1))"), CASES[:1])
     assert episode.failure == ""
 
 
@@ -99,6 +105,8 @@ def test_a_learners_file_can_be_its_agents_too(made: Callable[[str], str]):
     [
         ("from dextron_bench.world.engine import Engine", "agents may not import dextron_bench.world.engine"),
         ("from dextron_bench import splits", "agents may not import dextron_bench.splits"),
+        ("from dextron_bench import rollout", "agents may not import dextron_bench.evaluation"),
+        ("import dextron_bench; dextron_bench.load_split", "agents may not import dextron_bench.splits"),
         ("import mujoco", "agents may not import mujoco"),
         ("from dextron_bench.world import model; model.load()", "'NoneType' object is not callable"),
         ("import dextron_bench as d; open(d.__path__[0] + '/data/splits.json')", "settings and experts are not for"),
@@ -130,16 +138,18 @@ def test_a_learners_file_can_be_its_agents_too(made: Callable[[str], str]):
         ("while True: pass", "it gave no answer within 1 s"),
     ],
 )
-def test_what_fails_or_is_forbidden_fails_its_episodes_and_is_told(act: str, why: str, made: Callable[[str], str]):
-    for episode in play(made(act), CASES[:2], answer=1.0 if "while" in act else 20.0):
+def test_failing_or_forbidden_code_fails_its_episodes_and_is_named(
+    act: str, why: str, agent_spec: Callable[[str], str]
+):
+    for episode in play(agent_spec(act), CASES[:2], answer=1.0 if "while" in act else 20.0):
         assert episode.score == 0.0
         assert why in episode.failure
         assert episode.failure.endswith(" at step 0")
 
 
-@pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not here")
+@pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
 @pytest.mark.parametrize(
-    "deed",
+    "attempt",
     [
         "open('{data}/splits.json').read(1)",
         "open('{data}/experts-real.parquet', 'rb').read(1)",
@@ -150,48 +160,48 @@ def test_what_fails_or_is_forbidden_fails_its_episodes_and_is_told(act: str, why
         "__import__('shutil').rmtree('{package}') or 1",
     ],
 )
-def test_the_sandbox_holds_what_the_hook_does_not(deed: str, made: Callable[[str], str], tmp_path: Path):
-    """An agent that takes the hook apart, then says by its action whether it came out."""
+def test_the_sandbox_stops_agents_that_disable_the_hook(attempt: str, agent_spec: Callable[[str], str], tmp_path: Path):
+    """The agent disables the hook, and its action says whether the attempt succeeded."""
     package = Path(sandbox.__file__).parents[2]
     with socket.create_server(("127.0.0.1", 0)) as server:
         beside = tmp_path / "beside"
-        told = {"data": package / "data", "package": package, "beside": beside, "home": Path(__file__).parent}
-        wanted = deed.format(**told, port=server.getsockname()[1])
+        paths = {"data": package / "data", "package": package, "beside": beside, "home": Path(__file__).parent}
+        code = attempt.format(**paths, port=server.getsockname()[1])
         act = f"""
         from dextron_bench.methods.isolation import guard
         guard._Guard.__call__ = lambda *_: None
         import os
         try:
-            got = bool({wanted})
+            succeeded = bool({code})
         except Exception:
-            got = False
-        return np.full((len(states), 1), 1.0 if got else -1.0)"""
-        (episode,) = play(made(act.strip()), CASES[:1])
+            succeeded = False
+        return np.full((len(states), 1), 1.0 if succeeded else -1.0)"""
+        (episode,) = play(agent_spec(act.strip()), CASES[:1])
         assert episode.failure == ""
         assert (episode.actions == -1.0).all()
         assert not beside.exists()
     assert (package / "data" / "splits.json").exists()
 
 
-def test_an_agent_may_write_where_it_is_started(made: Callable[[str], str]):
+def test_an_agent_may_write_in_its_own_folder(agent_spec: Callable[[str], str]):
     act = f"open('note', 'w').write('x'); import os; os.remove('note'); {CLOSES}"
-    assert [episode.failure for episode in play(made(act))] == [""] * 3
+    assert [episode.failure for episode in play(agent_spec(act))] == [""] * 3
 
 
-def test_nan_fails_one_episode_and_a_crash_those_that_were_played(made: Callable[[str], str]):
-    """With two slots the third episode begins after the crash, in a process started again."""
-    nan = play(made("a = np.zeros((len(states), 1)); a[0] = np.nan; return a"), CASES[:2])
+def test_nan_fails_one_episode_and_a_crash_fails_the_current_episodes(agent_spec: Callable[[str], str]):
+    """With two slots the third episode begins after the crash, in a new process."""
+    nan = play(agent_spec("a = np.zeros((len(states), 1)); a[0] = np.nan; return a"), CASES[:2])
     assert [episode.failure for episode in nan] == ["action is nan at step 0", ""]
     act = "import os; os.path.exists('been') or (open('been', 'w').close(), os._exit(1)); " + CLOSES
-    first, second, third = play(made(act))
+    first, second, third = play(agent_spec(act))
     assert first.failure == second.failure == "it ended with code 1 at step 0"
     assert third.failure == ""
     assert len(third.actions) > 10
 
 
-def test_what_is_slow_in_all_is_stopped_for_good(made: Callable[[str], str]):
+def test_an_agent_that_uses_up_its_time_is_stopped(agent_spec: Callable[[str], str]):
     """Starting the process alone takes longer than a millisecond; with two slots the third episode comes after it."""
-    first, second, third = play(made(CLOSES), total=0.001)
+    first, second, third = play(agent_spec(CLOSES), total=0.001)
     assert first.failure == second.failure == "it has had the 0.001 s that all its answers may take at step 1"
     assert third.failure == "it has had the 0.001 s that all its answers may take at step 0"
 
@@ -205,7 +215,7 @@ def test_what_is_slow_in_all_is_stopped_for_good(made: Callable[[str], str]):
         ("print('x' * 10000, flush=True)", "its answer is longer than 4176 bytes"),
     ],
 )
-def test_a_program_that_does_not_speak_the_protocol_is_named(tmp_path: Path, line: str, why: str):
+def test_a_program_that_does_not_follow_the_protocol_is_reported(tmp_path: Path, line: str, why: str):
     (tmp_path / "agent.py").write_text(f"input()\n{line}\ninput()\n")
     with pytest.raises(AgentError, match="the agent") as caught:
         play(f"exec:{sys.executable} {tmp_path}/agent.py")
@@ -220,7 +230,7 @@ for line in sys.stdin:
 """
 
 
-def test_a_program_in_any_language_plays(tmp_path: Path):
+def test_a_program_that_follows_the_protocol_plays(tmp_path: Path):
     (tmp_path / "agent.py").write_text(PROGRAM)
     for episode in play(f"exec:{sys.executable} {tmp_path}/agent.py"):
         assert episode.failure == ""
@@ -231,29 +241,29 @@ def test_a_program_in_any_language_plays(tmp_path: Path):
     ("spec", "why"),
     [("exec:agent 'x", "is not a command"), ("__main__:Agent", "agents cannot come from the module __main__")],
 )
-def test_words_that_name_no_agent_are_told(spec: str, why: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)  # As it is in a program that was begun by its file.
+def test_a_text_that_names_no_agent_raises(spec: str, why: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)  # As in a program that is started from a file.
     with pytest.raises(AgentError, match=why):
         prepare_launch(spec)
 
 
-def test_an_agent_is_given_time_and_memory():
+def test_limits_are_positive():
     with pytest.raises(AgentError, match="--timeout and --memory are more than 0"):
         Limits(memory=-1)
 
 
-def test_a_program_that_is_not_there_is_named():
+def test_a_program_that_does_not_exist_is_named():
     with pytest.raises(AgentError, match=r"it ended with code 127: .*no-such-program"):
         play("exec:no-such-program")
 
 
 def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
-    class Closes(torch.nn.Module):
+    class Constant(torch.nn.Module):
         def forward(self, states: torch.Tensor) -> torch.Tensor:
             return torch.tanh(states[:, :1] * 0.0 + 0.25)
 
     file = tmp_path / "policy.pt"
-    torch.jit.save(torch.jit.script(Closes()), str(file))
+    torch.jit.save(torch.jit.script(Constant()), str(file))
     for episode in play(str(file), CASES[:1]):
         np.testing.assert_allclose(episode.actions, np.tanh(0.25), atol=1e-7)
     torch.save({"weights": 1}, file)
@@ -264,7 +274,7 @@ def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
 
 
 def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):
-    """The policy's action is -4 times the palm's x, within [-1, 1]."""
+    """The policy's action is -4 times the palm's x, clipped to [-1, 1]."""
     states = onnx.helper.make_tensor_value_info("states", onnx.TensorProto.FLOAT, ["N", 48])
     actions = onnx.helper.make_tensor_value_info("actions", onnx.TensorProto.FLOAT, ["N", 1])
     choice = onnx.numpy_helper.from_array(np.eye(48, 1, -7, dtype=np.float32) * np.float32(-4.0), "choice")
@@ -288,16 +298,16 @@ def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):
 
 
 @given(st.binary(max_size=200), st.integers(1, 5))
-def test_whatever_a_process_writes_is_actions_or_a_bad_answer(line: bytes, count: int):
+def test_any_answer_is_parsed_as_actions_or_raises(line: bytes, count: int):
     with suppress(protocol.BadAnswer):
         assert protocol.read_actions(line, count).shape == (count, 1)
 
 
 @given(st.lists(st.floats(), min_size=1, max_size=5))
-def test_actions_come_through_bit_for_bit(actions: list[float]):
+def test_actions_and_states_are_sent_bit_for_bit(actions: list[float]):
     sent = np.array(actions)[:, None]
     np.testing.assert_array_equal(protocol.read_actions(protocol.write_actions(sent), len(actions)), sent)
     states = np.array(actions)[:, None].repeat(48, axis=1)
-    rows, found = protocol.read_question(protocol.write_question([0], states))
+    rows, received = protocol.read_question(protocol.write_question([0], states))
     assert rows.tolist() == [0]
-    np.testing.assert_array_equal(found, states)
+    np.testing.assert_array_equal(received, states)

@@ -1,4 +1,4 @@
-"""Processes that are asked by lines: how they end is told at once, and nothing of them stays."""
+"""Processes that answer lines: an ended process is reported at once, and its threads end."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ import pytest
 from dextron_bench.methods.isolation.process import NoAnswer, Process
 
 ONCE = "print(input()); raise SystemExit(7)"
-CHATTER = "while True: print('more', flush=True)"
+FLOOD = "while True: print('more', flush=True)"
 
 
-def started(script: str, here: Path) -> Process:
+def start(script: str, here: Path) -> Process:
     return Process([sys.executable, "-c", script], str(here), max_answer=100)
 
 
-def test_one_that_ended_between_two_questions_is_told_at_once(tmp_path: Path):
-    process = started(ONCE, tmp_path)
+def test_a_process_that_ended_between_two_questions_is_reported_at_once(tmp_path: Path):
+    process = start(ONCE, tmp_path)
     assert process.ask(b"first\n", 60.0) == b"first\n"
     while process._popen.poll() is None or process._answers.empty():
         time.sleep(0.01)
-    with pytest.raises(NoAnswer, match="it ended") as told:
+    with pytest.raises(NoAnswer, match="it ended") as caught:
         process.ask(b"second\n", 10_000.0)
-    assert process.describe_failure(told.value) == "it ended with code 7"
+    assert process.describe_failure(caught.value) == "it ended with code 7"
     process.kill()
 
 
-def test_the_threads_of_one_that_says_too_much_end_with_it(tmp_path: Path):
+def test_the_threads_of_a_process_that_writes_too_much_end_with_it(tmp_path: Path):
     before = threading.active_count()
-    process = started(CHATTER, tmp_path)
+    process = start(FLOOD, tmp_path)
     while not process._answers.full():
         time.sleep(0.01)
     with pytest.raises(NoAnswer, match="it wrote 5 bytes that nobody asked for"):
         process.ask(b"first\n", 60.0)
     process.kill()
-    late = time.monotonic() + 60.0
-    while threading.active_count() > before and time.monotonic() < late:
+    deadline = time.monotonic() + 60.0
+    while threading.active_count() > before and time.monotonic() < deadline:
         time.sleep(0.01)
     assert threading.active_count() <= before
