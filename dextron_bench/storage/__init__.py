@@ -1,1 +1,1 @@
-"""Files that are whole or absent, their hashes, and the code and versions that made them."""
+"""Atomic files, their hashes, run folders and their configs, and provenance."""

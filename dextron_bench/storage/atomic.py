@@ -1,4 +1,4 @@
-"""Files that are either whole or absent: written in one move, read with a clear error."""
+"""Writes files completely or not at all, and reads JSON files with a clear error."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 
 
 class DamagedFile(ValueError):
-    """A file that is not whole; the message names it and says what to do."""
+    """A file that cannot be read; the message names it and says what to do."""
 
     def __init__(self, file: Path, why: object) -> None:
         super().__init__(f"{file} is damaged ({why}); remove it and run again")
 
 
 def write_atomically(file: Path, write: Callable[[Path], object]) -> None:
-    """Calls `write` on a temporary file, then replaces `file` with it in one move.
+    """Calls `write` on a temporary file, then replaces `file` with it in one step.
 
     If the process dies at any moment, `file` holds its old content or its new content. Errors leave no temporary file.
     """
@@ -25,8 +25,8 @@ def write_atomically(file: Path, write: Callable[[Path], object]) -> None:
     temporary = file.with_name(f".{file.name}.{os.getpid()}.part")
     try:
         write(temporary)
-        with temporary.open("rb+") as written:
-            os.fsync(written.fileno())
+        with temporary.open("rb+") as content:
+            os.fsync(content.fileno())
         os.replace(temporary, file)
     finally:
         temporary.unlink(missing_ok=True)
@@ -45,5 +45,5 @@ def read_json(file: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise DamagedFile(file, error) from error
     if not isinstance(content, dict):
-        raise DamagedFile(file, "it holds no JSON object")
+        raise DamagedFile(file, "it does not hold a JSON object")
     return content

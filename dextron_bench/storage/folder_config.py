@@ -14,7 +14,7 @@ RUN_ADVICE = "remove it, or choose another folder with --runs"
 
 
 class FolderMismatch(ValueError):
-    """A folder that belongs to another config than the given one."""
+    """A folder that holds another config than the given one."""
 
 
 def check(folder: Path, config: Mapping[str, Any]) -> None:
@@ -25,7 +25,7 @@ def check(folder: Path, config: Mapping[str, Any]) -> None:
 def write_or_check(folder: Path, config: Mapping[str, Any]) -> None:
     """Writes config and provenance of a run if there is no config yet; raises the same errors as `check`.
 
-    `config` has the hash of the physics.
+    `config` contains the hash of the physics.
     """
     run = RunFolder(folder)
     if not run.config.exists():  # The config is written last: if it exists, the provenance exists too.
@@ -53,13 +53,13 @@ def _check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> 
 
 
 def _differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:
-    """Names of the entries of `expected` that are not stored like that; inner names of a mapping in brackets."""
+    """Names of the entries of `expected` with another stored value; inner names of a mapping in brackets."""
     for name, value in expected.items():
-        other = stored.get(name)
-        if other == value:
+        stored_value = stored.get(name)
+        if stored_value == value:
             continue
-        if isinstance(value, dict) and isinstance(other, dict):
-            inner = sorted(key for key in value | other if value.get(key) != other.get(key))
+        if isinstance(value, dict) and isinstance(stored_value, dict):
+            inner = sorted(key for key in value | stored_value if value.get(key) != stored_value.get(key))
             yield f"{name} ({', '.join(inner)})"
         else:
             yield name

@@ -8,11 +8,11 @@ from pathlib import Path
 
 def digest(*parts: bytes) -> str:
     """SHA-256 of the parts in order, hexadecimal; the hash includes the length of each part."""
-    total = hashlib.sha256()
+    hasher = hashlib.sha256()
     for part in parts:
-        total.update(len(part).to_bytes(8, "little"))
-        total.update(part)
-    return total.hexdigest()
+        hasher.update(len(part).to_bytes(8, "little"))
+        hasher.update(part)
+    return hasher.hexdigest()
 
 
 def sha256(file: Path) -> str:

@@ -31,15 +31,17 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _git(*words: str) -> str | None:
-    here = Path(__file__).resolve().parents[1]
-    if not (here.parent / ".git").exists():
+def _git(*arguments: str) -> str | None:
+    package = Path(__file__).resolve().parents[1]
+    if not (package.parent / ".git").exists():
         return None
     try:
-        done = subprocess.run(["git", "-C", str(here), *words], capture_output=True, text=True, timeout=10, check=True)
+        process = subprocess.run(
+            ["git", "-C", str(package), *arguments], capture_output=True, text=True, timeout=10, check=True
+        )
     except (OSError, subprocess.SubprocessError):
         return None
-    return done.stdout.strip()
+    return process.stdout.strip()
 
 
 def _processor() -> str:

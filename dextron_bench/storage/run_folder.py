@@ -1,6 +1,6 @@
 """The folder of a run, `<runs>/<label>/<reaches>/seed<k>`, and every path in it.
 
-It stands at the bottom of the layers because training, runs and the leaderboard all read and write run folders.
+This module is in the lowest layer because training, runs and leaderboard all use run folders.
 """
 
 from __future__ import annotations
@@ -45,32 +45,32 @@ class RunFolder:
 
     @property
     def config(self) -> Path:
-        """What the run depends on."""
+        """The file with what the run depends on."""
         return self.path / "config.json"
 
     @property
     def provenance(self) -> Path:
-        """The code, versions and machine of the run."""
+        """The file with code, versions and machine of the run."""
         return self.path / "provenance.json"
 
     @property
     def weights(self) -> Path:
-        """The weights that the agent acts with, if its method learns."""
+        """The file of the weights that the agent acts with, if its method learns."""
         return self.path / "weights.safetensors"
 
     @property
     def curve(self) -> Path:
-        """The learning curve, if the method learns."""
+        """The file of the learning curve, if the method learns."""
         return self.path / "curve.json"
 
     @property
     def episodes(self) -> Path:
-        """The table of episodes."""
+        """The file of the table of episodes."""
         return self.path / "episodes.parquet"
 
     @property
     def result(self) -> Path:
-        """The scores of all episodes, from which the leaderboard is computed."""
+        """The file with the scores of all episodes, from which the leaderboard is computed."""
         return self.path / "result.json"
 
     @property
@@ -80,11 +80,11 @@ class RunFolder:
 
     @property
     def manifest(self) -> Path:
-        """The SHA-256 of every recording."""
+        """The file with the SHA-256 of every recording."""
         return self.path / "recordings.json"
 
     def recording(self, split: str, row: int) -> Path:
-        """The recording of a split's row."""
+        """The file of the recording of a split's row."""
         return self.recordings / f"{split}-{row:04d}.rrd"
 
 

@@ -76,7 +76,7 @@ def open_block(file: Path) -> dict[str, np.ndarray]:
     Raises BadDataset, OSError.
     """
     try:
-        arrays = tensors.mapped(file)
+        arrays = tensors.memory_mapped(file)
         rows, episodes = len(arrays["actions"]), len(arrays["solved"])
         shapes = {"states": (rows, model.STATE), "actions": (rows,), "starts": (episodes + 1,), "solved": (episodes,)}
         if wrong := [name for name, shape in shapes.items() if arrays[name].shape != shape]:

@@ -20,7 +20,7 @@ from dextron_bench.cli.method_flags import one_line
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 from tests.helpers import tiny_benchmark, tiny_training, toy_learner
-from tests.helpers.tiny_training import HEIR, HOMELY, TOY
+from tests.helpers.tiny_training import MINJERK_TOY, TOY, TRANSFER
 
 SHAPE = model.STATE
 FAST = ("--quiet", "--no-floors", "--record", "0")
@@ -75,19 +75,19 @@ def test_seeds_that_are_trained_are_not_trained_again(here: Path, capsys: pytest
 
 
 def test_a_policy_transfer_acts_with_the_weights_of_its_source_policy(here: Path, capsys: pytest.CaptureFixture[str]):
-    (row,) = rows(capsys, *run(HEIR))
+    (row,) = rows(capsys, *run(TRANSFER))
     assert (row["method"], row["reaches"]) == ("toy-transfer", "synthetic")
     source_policy = here / "runs" / "minjerk-toy-0.1" / "minjerk" / "seed0"
     heir = here / "runs" / "toy-transfer" / "synthetic" / "seed0"
     assert (source_policy / "weights.safetensors").read_bytes() == (heir / "weights.safetensors").read_bytes()
     assert json.loads((heir / "result.json").read_text())["training"]["label"] == "minjerk-toy-0.1"
-    table = rows(capsys, *run(HOMELY), "--floors")
+    table = rows(capsys, *run(MINJERK_TOY), "--floors")
     assert {row["method"]: row["reaches"] for row in table} == dict.fromkeys(
         ("minjerk-toy-0.1", "nothing", "random"), "minjerk"
     )
     arrays = tensors.read(source_policy / "weights.safetensors")
     tensors.write(source_policy / "weights.safetensors", arrays, {"label": "minjerk-toy-0.1", "seed": 1})
-    assert main.main(run(HEIR)) == 2
+    assert main.main(run(TRANSFER)) == 2
     assert "holds a run with other weights" in capsys.readouterr().err
 
 
@@ -241,11 +241,11 @@ def damaged(folder: Path, kind: str) -> Path:
     ("kind", "expected"),
     [
         ("missing", "No such file or directory: missing.safetensors"),
-        ("empty", "empty.safetensors is damaged or no safetensors file"),
-        ("pickle", "pickle.safetensors is damaged or no safetensors file"),
-        ("header", "header.safetensors is damaged or no safetensors file"),
-        ("nested", "nested.safetensors is damaged or no safetensors file"),
-        ("cut", "cut.safetensors is damaged or no safetensors file"),
+        ("empty", "empty.safetensors is damaged or not a safetensors file"),
+        ("pickle", "pickle.safetensors is damaged or not a safetensors file"),
+        ("header", "header.safetensors is damaged or not a safetensors file"),
+        ("nested", "nested.safetensors is damaged or not a safetensors file"),
+        ("cut", "cut.safetensors is damaged or not a safetensors file"),
         ("shape", "shape.safetensors holds no weights that fit 'toy-0.1' (ValueError: matmul"),
         ("names", "names.safetensors holds no weights that fit 'toy-0.1' (KeyError: 'map')"),
         ("nan", "nan.safetensors holds numbers in 'map' that are not finite"),

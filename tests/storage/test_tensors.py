@@ -1,0 +1,59 @@
+"""Arrays read back exactly, equal arrays give equal bytes, and a damaged file is named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dextron_bench.storage import tensors
+
+ARRAYS = {
+    "a": np.arange(6, dtype=np.float64).reshape(2, 3).T,
+    "b": np.array([1, 2], np.uint8),
+    "c": np.float32(0.5).reshape(()),
+}
+
+
+@pytest.mark.parametrize("function", [tensors.read, tensors.memory_mapped])
+def test_arrays_and_metadata_read_back(tmp_path: Path, function: Callable[[Path], dict[str, np.ndarray]]):
+    file = tmp_path / "a.safetensors"
+    tensors.write(file, ARRAYS, {"epoch": 3, "label": "bc"})
+    arrays = function(file)
+    assert arrays.keys() == ARRAYS.keys()
+    for name, array in ARRAYS.items():
+        assert arrays[name].dtype == array.dtype
+        np.testing.assert_array_equal(arrays[name], array)
+    assert tensors.read_about(file) == {"epoch": 3, "label": "bc"}
+
+
+def test_arrays_in_memory_are_writable_and_mapped_ones_are_not(tmp_path: Path):
+    file = tmp_path / "a.safetensors"
+    tensors.write(file, ARRAYS, {})
+    tensors.read(file)["a"][0, 0] = 9.0
+    with pytest.raises(ValueError, match="read-only"):
+        tensors.memory_mapped(file)["a"][0, 0] = 9.0
+
+
+def test_equal_arrays_and_metadata_give_equal_bytes(tmp_path: Path):
+    tensors.write(tmp_path / "a", ARRAYS, {"x": 1, "y": 2})
+    tensors.write(tmp_path / "b", dict(reversed(ARRAYS.items())), {"y": 2, "x": 1})
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"12345678", (2**60).to_bytes(8, "little") + b"{", (5).to_bytes(8, "little") + b'{"a":']
+)
+@pytest.mark.parametrize("function", [tensors.read, tensors.memory_mapped, tensors.read_about])
+def test_a_damaged_file_is_named(tmp_path: Path, content: bytes, function: Callable[[Path], object]):
+    file = tmp_path / "a.safetensors"
+    file.write_bytes(content)
+    with pytest.raises(tensors.BadTensors, match=r"a\.safetensors is damaged or not a safetensors file \(.+\)"):
+        function(file)
+
+
+def test_a_folder_is_not_a_file_of_arrays(tmp_path: Path):
+    with pytest.raises(tensors.BadTensors, match="it is not a regular file"):
+        tensors.read(tmp_path)
