@@ -1,4 +1,4 @@
-"""How benchmarks measure: two ways of one piece of work turn about, so that a busy machine slows both alike."""
+"""Timing of benchmarks: two ways of doing the same work take turns, so that other load slows both equally."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Any
 
 from pytest_benchmark.fixture import BenchmarkFixture
 
-SCALE = float(os.environ.get("DEXTRON_BENCH_SCALE", "1"))  # Of all amounts of work; small ones only try the code out.
+SCALE = float(os.environ.get("DEXTRON_BENCH_SCALE", "1"))  # Factor of all work; small values test the code.
 
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table: a rate [unit], what it is held against [same unit], and the ratio aimed for."""
+    """A line of the table: a rate [unit], the rate it is compared with [same unit], and the intended ratio."""
 
     what: str
     unit: str
@@ -27,38 +27,38 @@ class Row:
 
 
 def scaled(amount: int) -> int:
-    """An amount of work at this run's scale, 4 at least."""
+    """An amount of work times SCALE, at least 4."""
     return max(4, round(amount * SCALE))
 
 
-def in_turns(
+def time_in_turns(
     benchmark: BenchmarkFixture, work: Callable[[], Any], reference: Callable[[], Any], rounds: int
 ) -> tuple[float, float]:
-    """Medians over rounds of the seconds that `work` and, right before each, `reference` take."""
-    mine, others = [], []
+    """Medians over rounds of the seconds of `work`, and of `reference`, which runs before `work` in each round."""
+    work_seconds, reference_seconds = list[float](), list[float]()
 
-    def before() -> None:
-        others.append(clocked(reference))
+    def time_reference() -> None:
+        reference_seconds.append(time_once(reference))
 
-    benchmark.pedantic(lambda: mine.append(clocked(work)), setup=before, rounds=rounds, iterations=1)
-    return median(mine), median(others)
-
-
-def alone(benchmark: BenchmarkFixture, work: Callable[[], Any], rounds: int) -> float:
-    """Median over rounds of the seconds that `work` takes."""
-    mine: list[float] = []
-    benchmark.pedantic(lambda: mine.append(clocked(work)), rounds=rounds, iterations=1)
-    return median(mine)
+    benchmark.pedantic(lambda: work_seconds.append(time_once(work)), setup=time_reference, rounds=rounds, iterations=1)
+    return median(work_seconds), median(reference_seconds)
 
 
-def clocked(work: Callable[[], Any]) -> float:
-    """Seconds that `work` takes."""
-    began = time.perf_counter()
+def time_work(benchmark: BenchmarkFixture, work: Callable[[], Any], rounds: int) -> float:
+    """Median over rounds of the seconds of `work`."""
+    seconds: list[float] = []
+    benchmark.pedantic(lambda: seconds.append(time_once(work)), rounds=rounds, iterations=1)
+    return median(seconds)
+
+
+def time_once(work: Callable[[], Any]) -> float:
+    """Seconds of one call of `work`."""
+    start = time.perf_counter()
     work()
-    return time.perf_counter() - began
+    return time.perf_counter() - start
 
 
-def note(benchmark: BenchmarkFixture, *rows: Row) -> None:
-    """Keeps lines of the table beside the benchmark's own numbers."""
+def store_rows(benchmark: BenchmarkFixture, *rows: Row) -> None:
+    """Stores lines of the table in the JSON of pytest-benchmark."""
     benchmark.extra_info["rows"] = [asdict(row) for row in rows]
     benchmark.extra_info["scale"] = SCALE

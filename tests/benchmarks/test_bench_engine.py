@@ -1,4 +1,4 @@
-"""How much of bare MuJoCo's speed is left when the benchmark's own work is added."""
+"""Speed of rollouts compared with the bare physics of MuJoCo on the same inputs."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.reach import Path
 from dextron_bench.world import model
 from dextron_bench.world.engine import Engine, Step
-from tests.benchmarks.measure import Row, alone, in_turns, note, scaled
-from tests.benchmarks.workload import Prepared, cases, reaches
+from tests.benchmarks.measure import Row, scaled, store_rows, time_in_turns, time_work
+from tests.benchmarks.workload import PreparedSource, default_source, draw_cases
 
 EPISODES, SLOTS, ROUNDS = 192, 96, 3
 INPUTS = ("ctrl", "mocap_pos", "mocap_quat")
@@ -27,62 +27,62 @@ INPUTS = ("ctrl", "mocap_pos", "mocap_quat")
 
 @dataclass
 class Tape:
-    """All that goes into a batch: rows of begun episodes by slot, and each step's slots with their inputs."""
+    """All inputs of a batch: state rows of new episodes by slot, and the slots of each step with their inputs."""
 
     slots: int = 0
     events: list[tuple[np.ndarray, list[np.ndarray]]] = field(default_factory=list)
-    begins: dict[int, list[tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict)
+    starts: dict[int, list[tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict)
 
     @property
     def steps(self) -> int:
-        """Control steps of all episodes."""
+        """Number of control steps of all episodes."""
         return sum(len(ids) for ids, _ in self.events)
 
 
-class Listening(Engine):
-    """An engine that keeps what it gives to its batch."""
+class RecordingEngine(Engine):
+    """An engine that stores the inputs of its batch on a tape."""
 
     tape: Tape
 
     def begin(self, ids: np.ndarray, paths: Sequence[Path]) -> np.ndarray:
-        """As an engine; the rows are kept."""
+        """Like the engine's method, and stores the state rows."""
         states = super().begin(ids, paths)
         self.tape.slots = self.slots
-        self.tape.begins.setdefault(len(self.tape.events), []).append((ids.copy(), self._batch.state[ids].copy()))
+        self.tape.starts.setdefault(len(self.tape.events), []).append((ids.copy(), self._batch.state[ids].copy()))
         return states
 
     def step(self, ids: np.ndarray, actions: np.ndarray) -> Step:
-        """As an engine; the slots and their inputs are kept."""
+        """Like the engine's method, and stores the slots and their inputs."""
         step = super().step(ids, actions)
-        ordered = np.sort(ids)
-        self.tape.events.append((ordered, [getattr(self, f"_{name}")[ordered].copy() for name in INPUTS]))
+        slots = np.sort(ids)
+        self.tape.events.append((slots, [getattr(self, f"_{name}")[slots].copy() for name in INPUTS]))
         return step
 
 
-def taped(played: list[policies.Case], source: Prepared) -> Tape:
-    """What a rollout of experts gives to its batch."""
+def record_tape(cases: list[policies.Case], source: PreparedSource) -> Tape:
+    """The tape of a rollout of experts."""
 
-    class ThisTape(Listening):
+    class ThisEngine(RecordingEngine):
         tape = Tape()
 
-    original, evaluation_rollout.Engine = evaluation_rollout.Engine, ThisTape
+    original, evaluation_rollout.Engine = evaluation_rollout.Engine, ThisEngine
     try:
-        play(played, source, 0)
+        play(cases, source, 0)
     finally:
         evaluation_rollout.Engine = original
-    return ThisTape.tape
+    return ThisEngine.tape
 
 
-def play(played: list[policies.Case], source: Prepared, threads: int) -> list[tuple[int, episodes.Episode]]:
-    """Experts through the one evaluation loop."""
-    return list(rollout(ExpertAgent(), source, played, slots=SLOTS, threads=threads))
+def play(cases: list[policies.Case], source: PreparedSource, threads: int) -> list[tuple[int, episodes.Episode]]:
+    """Plays experts with the function that all evaluations use."""
+    return list(rollout(ExpertAgent(), source, cases, slots=SLOTS, threads=threads))
 
 
 def replay(tape: Tape, batch: Batch) -> None:
-    """The same physics with nothing around it."""
+    """Steps the same physics without the work around it."""
     inputs = [batch.bind(name) for name in INPUTS]
     for number, (ids, values) in enumerate(tape.events):
-        for slots, rows in tape.begins.get(number, ()):
+        for slots, rows in tape.starts.get(number, ()):
             batch.state[slots] = rows
         for bound, value in zip(inputs, values, strict=True):
             bound[ids] = value
@@ -91,33 +91,35 @@ def replay(tape: Tape, batch: Batch) -> None:
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_engine_against_bare_physics(benchmark: BenchmarkFixture, threads: int):
-    played = cases(scaled(EPISODES))
-    source = Prepared(played)
-    tape = taped(played, source)
+    drawn_cases = draw_cases(scaled(EPISODES))
+    source = PreparedSource(drawn_cases)
+    tape = record_tape(drawn_cases, source)
     batch = Batch(model.load(), tape.slots, threads)
-    mine, floor = in_turns(benchmark, lambda: play(played, source, threads), lambda: replay(tape, batch), ROUNDS)
+    seconds, bare_seconds = time_in_turns(
+        benchmark, lambda: play(drawn_cases, source, threads), lambda: replay(tape, batch), ROUNDS
+    )
     what = f"Control steps: experts through `rollout`, {threads} thread{'s'[: threads - 1]}"
-    rates = tape.steps / mine, tape.steps / floor
-    note(benchmark, Row(what, "steps/s", rates[0], "the same inputs to bare `Batch.step`", rates[1], aim=0.95))
+    rates = tape.steps / seconds, tape.steps / bare_seconds
+    store_rows(benchmark, Row(what, "steps/s", rates[0], "the same inputs to bare `Batch.step`", rates[1], aim=0.95))
 
 
-def test_the_tape_is_the_rollout():
-    """The floor does the same work, to the bit."""
-    played = cases(4)
-    source = Prepared(played)
-    tape = taped(played, source)
+def test_the_bare_physics_does_the_work_of_the_rollout():
+    """Both end in the same states, bit for bit."""
+    four_cases = draw_cases(4)
+    source = PreparedSource(four_cases)
+    tape = record_tape(four_cases, source)
     batch = Batch(model.load(), tape.slots, 1)
     replay(tape, batch)
-    ends = {index: episode.states[-1] for index, episode in play(played, source, 1)}
+    ends = {index: episode.states[-1] for index, episode in play(four_cases, source, 1)}
     qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
-    for index in range(4):  # As many slots as cases: each slot stands where its episode ended.
+    for index in range(4):  # With a slot for each case, each slot holds the end of its episode.
         np.testing.assert_array_equal(np.concatenate([qpos[index], qvel[index]]), ends[index])
 
 
 def test_reach_preparation(benchmark: BenchmarkFixture):
-    asked = [case.setting for case in cases(scaled(500))]
-    source = reaches()
-    for setting in asked:
-        source.path(setting)  # Splines are kept from the first use on, as in a search.
-    seconds = alone(benchmark, lambda: [source.path(setting) for setting in asked], ROUNDS)
-    note(benchmark, Row(f"Paths of settings, {source.name} reaches", "paths/s", len(asked) / seconds))
+    settings = [case.setting for case in draw_cases(scaled(500))]
+    source = default_source()
+    for setting in settings:
+        source.path(setting)  # The source keeps splines from their first use on, as in a search.
+    seconds = time_work(benchmark, lambda: [source.path(setting) for setting in settings], ROUNDS)
+    store_rows(benchmark, Row(f"Paths of settings, {source.name} reaches", "paths/s", len(settings) / seconds))

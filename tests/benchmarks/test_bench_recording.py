@@ -1,4 +1,4 @@
-"""What it costs to keep episodes, to record them, to read them back, and to ask the success model."""
+"""The cost of storing episodes, recording them, reading them back, and predicting their success."""
 
 from __future__ import annotations
 
@@ -19,81 +19,84 @@ from dextron_bench.splits.loading import Split
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.success.network import SIZES, SuccessModel
 from dextron_bench.success.predict import predict
-from tests.benchmarks.measure import Row, alone, in_turns, note, scaled
-from tests.benchmarks.workload import Prepared, cases
+from tests.benchmarks.measure import Row, scaled, store_rows, time_in_turns, time_work
+from tests.benchmarks.workload import PreparedSource, draw_cases
 
 ROUNDS, EPISODES, FILES = 3, 32, 200
 
 
 def model() -> SuccessModel:
-    """A success model that knows nothing; it takes as long as one that does."""
+    """A success model with random weights, which is as fast as a trained one."""
     rng = np.random.default_rng(0)
     layers = {f"layer.{i}": rng.normal(size=shape) / shape[-1] ** 0.5 for i, shape in enumerate(SIZES)}
     return SuccessModel(layers | {"mean": np.zeros(48), "deviation": np.ones(48)})
 
 
-class LiveView:
-    """Episodes as they are rolled out, and ways to keep them."""
+class Workbench:
+    """Rolls episodes out and stores them in several ways."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.cases, self.model = folder, cases(scaled(EPISODES)), model()
-        self.source = Prepared(self.cases)
+        self.folder, self.cases, self.model = folder, draw_cases(scaled(EPISODES)), model()
+        self.source = PreparedSource(self.cases)
         self.episodes: dict[int, episodes.Episode] = {}
 
     def play(self) -> None:
-        """Rolls them out, on all cores."""
+        """Rolls the episodes out on all cores."""
         self.episodes = dict(rollout(ExpertAgent(), self.source, self.cases))
 
     def keep(self) -> None:
-        """Writes the table of a run, from which each can be played again."""
+        """Writes the table of a run, which is sufficient to replay each episode."""
         split = Split("test", self.source.name, tuple(self.cases), "")
         rows = [episode_table.row(split, index, self.episodes[index]) for index in range(len(self.cases))]
         run_files.store_episodes(RunFolder(self.folder), pd.DataFrame(rows))
 
     def record(self) -> None:
         """Writes recordings."""
-        for index, each in self.episodes.items():
-            recording.write(self.folder / f"{index}.rrd", each, self.source.path(each.setting), {"row": index})
+        for index, episode in self.episodes.items():
+            path = self.source.path(episode.setting)
+            recording.write(self.folder / f"{index}.rrd", episode, path, {"row": index})
 
-    def explain(self) -> None:
-        """Writes recordings that show what the success model thinks."""
-        for index, each in self.episodes.items():
-            seen = predict(self.model, self.source, self.cases[index], each)
-            recording.write(self.folder / f"{index}.rrd", each, self.source.path(each.setting), {"row": index}, seen)
+    def record_predictions(self) -> None:
+        """Writes recordings with the predictions of the success model."""
+        for index, episode in self.episodes.items():
+            path = self.source.path(episode.setting)
+            predictions = predict(self.model, self.source, self.cases[index], episode)
+            recording.write(self.folder / f"{index}.rrd", episode, path, {"row": index}, predictions)
 
 
 @pytest.mark.parametrize(
     ("way", "what"),
     [
-        ("keep", "Episodes kept in `episodes.parquet`, to be played again"),
+        ("keep", "Episodes stored in `episodes.parquet`, sufficient for a replay"),
         ("record", "Episodes recorded"),
-        ("explain", "Episodes recorded with the success model's curves"),
+        ("record_predictions", "Episodes recorded with the success model's curves"),
     ],
 )
-def test_keeping_against_rollout(benchmark: BenchmarkFixture, tmp_path: Path, way: str, what: str):
-    stage = LiveView(tmp_path)
-    seconds, rolled = in_turns(benchmark, getattr(stage, way), stage.play, ROUNDS)
-    rates = len(stage.cases) / seconds, len(stage.cases) / rolled
-    note(benchmark, Row(what, "episodes/s", rates[0], "episodes rolled out, all cores", rates[1]))
+def test_storing_compared_with_rollout(benchmark: BenchmarkFixture, tmp_path: Path, way: str, what: str):
+    workbench = Workbench(tmp_path)
+    seconds, rolled = time_in_turns(benchmark, getattr(workbench, way), workbench.play, ROUNDS)
+    rates = len(workbench.cases) / seconds, len(workbench.cases) / rolled
+    store_rows(benchmark, Row(what, "episodes/s", rates[0], "episodes rolled out, all cores", rates[1]))
 
 
 def test_reading_scalars_back(benchmark: BenchmarkFixture, tmp_path: Path):
-    stage = LiveView(tmp_path)
-    stage.play()
-    stage.record()
-    files = [tmp_path / f"{number % len(stage.cases)}.rrd" for number in range(scaled(FILES))]
+    workbench = Workbench(tmp_path)
+    workbench.play()
+    workbench.record()
+    files = [tmp_path / f"{number % len(workbench.cases)}.rrd" for number in range(scaled(FILES))]
 
     def read() -> None:
         for file in files:
             stream = RrdReader(file).store().stream().filter(content="/episode/rewards")
             assert any(chunk.num_rows for chunk in stream.to_chunks())
 
-    note(benchmark, Row("Rewards read back from recordings", "files/s", len(files) / alone(benchmark, read, ROUNDS)))
+    seconds = time_work(benchmark, read, ROUNDS)
+    store_rows(benchmark, Row("Rewards read back from recordings", "files/s", len(files) / seconds))
 
 
 @pytest.mark.parametrize("count", [1, 16, 256])
 def test_curves_of_the_success_model(benchmark: BenchmarkFixture, count: int):
-    judge, states = model(), np.random.default_rng(1).normal(size=(count, 48))
-    seconds = alone(benchmark, lambda: judge.curve(states), 20)
+    success_model, states = model(), np.random.default_rng(1).normal(size=(count, 48))
+    seconds = time_work(benchmark, lambda: success_model.curve(states), 20)
     what = f"Success curves of 51 actions, {count} state{'s'[: count - 1]} at once"
-    note(benchmark, Row(what, "calls/s", 1.0 / seconds, "control steps of 20 ms", 50.0))
+    store_rows(benchmark, Row(what, "calls/s", 1.0 / seconds, "control steps of 20 ms", 50.0))

@@ -1,4 +1,4 @@
-"""What the search for experts costs, and what sharing the opening saves."""
+"""The cost of the search for experts, and what it saves by branching experts from one rollout."""
 
 from __future__ import annotations
 
@@ -18,58 +18,66 @@ from dextron_bench.reaches.recorded import cache
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.world.engine import Engine
-from tests.benchmarks.measure import Row, alone, in_turns, note, scaled
-from tests.benchmarks.workload import reaches
+from tests.benchmarks.measure import Row, scaled, store_rows, time_in_turns, time_work
+from tests.benchmarks.workload import default_source
 
 SETTINGS, ROUNDS = 128, 2
-PAPER = 1 / 90  # Rows above 1 for each second of one thread of the paper's cluster.
+PAPER = 1 / 90  # Rows with a return above 1 per second and thread on the paper's cluster.
 THREADS = os.cpu_count() or 1
 
 
-class Clocked:
-    """A source that adds up the seconds spent on making paths."""
+class TimedSource:
+    """A source that sums the seconds it needs to make paths."""
 
     def __init__(self, source: Source) -> None:
         self._source, self.seconds = source, 0.0
 
     def path(self, setting: Setting) -> Path:
-        """As the source itself."""
-        began = time.perf_counter()
+        """The path of the source."""
+        start = time.perf_counter()
         path = self._source.path(setting)
-        self.seconds += time.perf_counter() - began
+        self.seconds += time.perf_counter() - start
         return path
 
 
-def scores(source: Clocked, draws: pd.DataFrame, experts_each: int) -> np.ndarray:
-    """Sums of rewards of all draws, `experts_each` to an opening."""
+def play_draws(source: TimedSource, draws: pd.DataFrame, experts_per_rollout: int) -> np.ndarray:
+    """Returns of all draws, with `experts_per_rollout` experts branching from one rollout."""
     engine = Engine(montecarlo.SLOTS, THREADS)
-    asked = montecarlo.batches(source, draws, experts_each)  # type: ignore[arg-type]  # It only asks for paths.
-    found = dict(branching.play(engine, asked))
-    return np.concatenate([found[number].returns for number in range(len(found))])
+    batches = montecarlo.batches(source, draws, experts_per_rollout)  # type: ignore[arg-type]  # It needs only paths.
+    outcomes = dict(branching.play(engine, batches))
+    return np.concatenate([outcomes[number].returns for number in range(len(outcomes))])
 
 
-def test_search_with_shared_openings(benchmark: BenchmarkFixture):
-    search = Search(reaches().name, block=scaled(SETTINGS))
-    draws = montecarlo.draw(reaches(), search, 0)
-    source, kept = Clocked(reaches()), []
+def test_search_with_branching(benchmark: BenchmarkFixture):
+    search = Search(default_source().name, block=scaled(SETTINGS))
+    draws = montecarlo.draw(default_source(), search, 0)
+    source, results = TimedSource(default_source()), []
 
-    def shared() -> None:
+    def branched() -> None:
         source.seconds = 0.0
-        kept.append(scores(source, draws, search.experts))
+        results.append(play_draws(source, draws, search.experts))
 
-    def naive() -> None:
-        kept.append(scores(Clocked(reaches()), draws, 1))
+    def one_by_one() -> None:
+        results.append(play_draws(TimedSource(default_source()), draws, 1))
 
-    seconds, one_by_one = in_turns(benchmark, shared, naive, ROUNDS)
-    assert all((found == kept[0]).all() for found in kept)
-    rows = int((kept[0] > blocks.KEPT).sum())
+    seconds, reference_seconds = time_in_turns(benchmark, branched, one_by_one, ROUNDS)
+    assert all((returns == results[0]).all() for returns in results)
+    rows = int((results[0] > blocks.KEPT).sum())
     rate = rows / (seconds * THREADS)
-    against = "one episode a draw, the same draws"
-    note(
+    against = "one rollout for each draw, the same draws"
+    draws_per_second = len(draws) / seconds, len(draws) / reference_seconds
+    rows_text, unit = f"Rows with a return above 1 ({rows} rows)", "rows/core-second"
+    store_rows(
         benchmark,
-        Row("Draws of a search, 8 to an opening", "draws/s", len(draws) / seconds, against, len(draws) / one_by_one),
-        Row(f"Rows above 1 ({rows} found)", "rows/core-second", rate, against, rows / (one_by_one * THREADS)),
-        Row(f"Rows above 1 ({rows} found)", "rows/core-second", rate, "the paper's one in 90 thread-seconds", PAPER),
+        Row(
+            "Draws of a search, 8 experts from one rollout",
+            "draws/s",
+            draws_per_second[0],
+            against,
+            draws_per_second[1],
+        ),
+        Row(rows_text, unit, rate, against, rows / (reference_seconds * THREADS)),
+        Row(rows_text, unit, rate, "the paper's one in 90 thread-seconds", PAPER),
         Row("Share of a search spent on paths", "", source.seconds / seconds),
     )
 
@@ -79,5 +87,5 @@ def test_open_recorded_reaches(
 ):
     monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path))
     cache.import_release(release)
-    seconds = alone(benchmark, lambda: open_source("real"), 5)
-    note(benchmark, Row("`open_source('real')` from the cache", "times/s", 1 / seconds))
+    seconds = time_work(benchmark, lambda: open_source("real"), 5)
+    store_rows(benchmark, Row("`open_source('real')` from the cache", "times/s", 1 / seconds))

@@ -1,4 +1,4 @@
-"""How fast agents learn: stacked updates against Stable-Baselines3, the whole cycle, and what a checkpoint costs."""
+"""Speed of training: stacked updates compared with Stable-Baselines3, whole cycles, and checkpoints."""
 
 from __future__ import annotations
 
@@ -17,37 +17,37 @@ from baselines.cycle import FRAMES, Cycle
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import Schedule
 from dextron_bench.methods.learners import Track
-from tests.benchmarks.measure import Row, alone, clocked, in_turns, note, scaled
-from tests.benchmarks.workload import cases, reaches
+from tests.benchmarks.measure import Row, scaled, store_rows, time_in_turns, time_once, time_work
+from tests.benchmarks.workload import default_source, draw_cases
 
 ROUNDS = 5
-FILLED = 1000  # Transitions in the peer's buffer.
+FILLED = 1000  # Transitions in the buffer of Stable-Baselines3.
 
 
-class Idle(gymnasium.Env):
-    """A world of the right shape in which nothing happens."""
+class RandomEnv(gymnasium.Env):
+    """An environment with the shapes of ours and random states."""
 
     observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (48,), np.float32)
     action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
-        """A state drawn anew."""
+        """A random state."""
         super().reset(seed=seed)
         return self.np_random.normal(size=48).astype(np.float32), {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
-        """Another."""
+        """A random state and a constant reward."""
         return self.np_random.normal(size=48).astype(np.float32), 0.1, False, False, {}
 
 
 @cache
-def peer():
-    """Stable-Baselines3's SAC with the same sizes and a filled buffer."""
+def peer_sac():
+    """SAC of Stable-Baselines3 with the same layer sizes and a filled buffer."""
     sb3 = pytest.importorskip("stable_baselines3")
     sizes = {"net_arch": [256, 256]}
-    made = sb3.SAC("MlpPolicy", Idle(), batch_size=BATCH, learning_starts=FILLED, policy_kwargs=sizes, device="cpu")
-    made.learn(FILLED)
-    return made
+    sac = sb3.SAC("MlpPolicy", RandomEnv(), batch_size=BATCH, learning_starts=FILLED, policy_kwargs=sizes, device="cpu")
+    sac.learn(FILLED)
+    return sac
 
 
 def batches(agents: int, count: int) -> list[tuple[Batch, torch.Tensor]]:
@@ -63,38 +63,38 @@ def batches(agents: int, count: int) -> list[tuple[Batch, torch.Tensor]]:
 @pytest.mark.parametrize(("agents", "aim"), [(1, None), (3, 5.0), (12, 7.0)])
 def test_updates(benchmark: BenchmarkFixture, agents: int, aim: float | None) -> None:
     learner, count = Sac([np.random.default_rng(k) for k in range(agents)]), scaled(200)
-    given, other = batches(agents, 8), peer()
+    inputs, peer = batches(agents, 8), peer_sac()
 
-    def mine() -> None:
+    def update() -> None:
         for k in range(count):
-            learner.update(*given[k % len(given)])
+            learner.update(*inputs[k % len(inputs)])
 
-    seconds, others = in_turns(benchmark, mine, lambda: other.train(count, BATCH), ROUNDS)
-    what = f"Updates of SAC, each of {agents} agents stacked"
-    against = "an update of Stable-Baselines3's SAC (two critics, where the paper has Q and V)"
-    note(benchmark, Row(what, "updates/s", count * agents / seconds, against, count / others, aim))
+    seconds, peer_seconds = time_in_turns(benchmark, update, lambda: peer.train(count, BATCH), ROUNDS)
+    what = f"Updates of SAC for each of {agents} stacked agent{'s'[: agents - 1]}"
+    against = "an update of Stable-Baselines3's SAC (two critics; the paper has Q and V)"
+    store_rows(benchmark, Row(what, "updates/s", count * agents / seconds, against, count / peer_seconds, aim))
 
 
 @pytest.mark.parametrize("agents", [1, 3])
 def test_cycles(benchmark: BenchmarkFixture, agents: int, tmp_path: Path) -> None:
-    track = Track(reaches(), cases(24), tmp_path)
+    track = Track(default_source(), draw_cases(24), tmp_path)
     trainer = Cycle(track, range(agents), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
     trainer.advance()
     trainer.journal()
     rounds = max(1, round(3 * min(1.0, scaled(100) / 100)))
-    seconds = alone(benchmark, trainer.advance, rounds)
+    seconds = time_work(benchmark, trainer.advance, rounds)
     frames = FRAMES / seconds
     hours = 1000 * seconds / 3600
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     journal, state = trainer.journal(), trainer.state()
     size = sum(array.nbytes for array in state.values()) / 1e6
-    grown = sum(array.nbytes for array in journal.values()) / 1e6 / rounds
-    written = clocked(lambda: save_file(state, tmp_path / "checkpoint.safetensors"))
-    note(
+    growth = sum(array.nbytes for array in journal.values()) / 1e6 / rounds
+    write_seconds = time_once(lambda: save_file(state, tmp_path / "checkpoint.safetensors"))
+    seeds = f"{agents} seed{'s'[: agents - 1]}"
+    checkpoint = f"Checkpoint of {seeds}: {size:.0f} MB, and {growth:.2g} MB of experience per epoch"
+    store_rows(
         benchmark,
-        Row(f"Cycles of RLIL 0.1, {agents} seeds together (1,000 epochs: {hours:.2g} h)", "frames/s", frames),
-        Row(
-            f"Checkpoint of {agents} seeds: {size:.0f} MB, and {grown:.2g} MB an epoch of experience", "/s", 1 / written
-        ),
-        Row(f"Memory of the whole process after a few epochs of {agents} seeds", "MB", memory),
+        Row(f"Cycles of RLIL 0.1 with {seeds} (1,000 epochs: {hours:.2g} h)", "frames/s", frames),
+        Row(checkpoint, "/s", 1 / write_seconds),
+        Row(f"Memory of the whole process after a few epochs of {seeds}", "MB", memory),
     )

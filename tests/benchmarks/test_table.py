@@ -1,4 +1,4 @@
-"""The table says what was measured, with ratios done by hand."""
+"""Lines of the table of benchmarks, with ratios computed by hand."""
 
 from tests.benchmarks.table import line, number
 
@@ -10,5 +10,5 @@ def test_a_line_with_and_without_a_reference():
     assert line(ROW | {"against": "", "against_rate": None}) == "| Steps | 950 steps/s |  |  |  |\n"
 
 
-def test_numbers_have_three_digits():
+def test_numbers_have_three_significant_digits():
     assert [number(value) for value in (12345.6, 99.94, 0.012345)] == ["12,346", "99.9", "0.0123"]

@@ -1,4 +1,4 @@
-"""What benchmarks work on: recorded reaches where they are at hand, made ones else."""
+"""Inputs of benchmarks: recorded reaches if they are available, otherwise minimum-jerk reaches."""
 
 from __future__ import annotations
 
@@ -17,41 +17,42 @@ from dextron_bench.reaches.sources import open_source
 
 
 @cache
-def reaches() -> Source:
-    """The recorded reaches, from the cache or as DEXTRON_DATA names them, or else the simulated trajectories."""
+def default_source() -> Source:
+    """The recorded reaches if they are in the cache or named by DEXTRON_DATA; otherwise minimum-jerk reaches."""
     try:
         return open_source("real")
     except MissingData:
         return open_source("minjerk")
 
 
-def cases(count: int) -> list[Case]:
-    """Uniform settings with uniform experts, as a search draws them; always the same."""
-    draws = montecarlo.draw(reaches(), montecarlo.Search(reaches().name, experts=1, block=count), 0)
+def draw_cases(count: int) -> list[Case]:
+    """The same uniformly drawn settings with uniformly drawn experts in each run, as a search draws them."""
+    draws = montecarlo.draw(default_source(), montecarlo.Search(default_source().name, experts=1, block=count), 0)
     experts = [Expert(gain, critical) for gain, critical in zip(draws["gain"], draws["critical"], strict=True)]
-    return [Case(s, e, 0.0) for s, e in zip(reaches_setting.from_frame(draws), experts, strict=True)]
+    settings = reaches_setting.from_frame(draws)
+    return [Case(setting, expert, 0.0) for setting, expert in zip(settings, experts, strict=True)]
 
 
-class Prepared:
-    """A source whose paths are made before anything is measured."""
+class PreparedSource:
+    """A source that makes all paths before the measurement."""
 
     def __init__(self, cases: Sequence[Case]) -> None:
-        self._source = reaches()
+        self._source = default_source()
         self._paths = {case.setting: self._source.path(case.setting) for case in cases}
         self.name, self.names = self._source.name, self._source.names
 
     def path(self, setting: Setting) -> Path:
-        """The path made before."""
+        """The prepared path of a setting."""
         return self._paths[setting]
 
     def sample(self, rng: np.random.Generator) -> Setting:
-        """As the source itself."""
+        """A setting that the source draws."""
         return self._source.sample(rng)
 
     def stratum(self, reach: str) -> reaches_setting.Stratum:
-        """As the source itself."""
+        """Start region of a reach, from the source."""
         return self._source.stratum(reach)
 
     def duration(self, setting: Setting) -> float:
-        """As the source itself."""
+        """Duration of the reach [s], from the source."""
         return self._source.duration(setting)
