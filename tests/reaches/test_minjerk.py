@@ -1,4 +1,4 @@
-"""The simulated-trajectory world: its geometry, its law of motion, and what the paper's expert does there."""
+"""The source `minjerk`: its geometry, its law of motion, and the success of the paper's expert."""
 
 from __future__ import annotations
 
@@ -23,39 +23,39 @@ from dextron_bench.reaches.sources import open_source
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
 
-FIRST_OF_123 = [-0.106000607, -0.449409143, 0.1]  # [m] that a published name must always mean.
+FIRST_OF_123 = [-0.106000607, -0.449409143, 0.1]  # [m] frozen, since published results use the name.
 
 
-def at(name: str) -> Setting:
-    """The setting of a reach."""
+def setting(name: str) -> Setting:
+    """The only setting of a reach."""
     return Setting(name, 0.0, 0.0, 0.0)
 
 
-def test_it_is_a_source_of_a_thousand_reaches():
+def test_the_source_has_a_thousand_reaches():
     source = open_source("minjerk")
     assert (source.name, len(source.names)) == ("minjerk", 1000)
     assert source.names[0] == "minjerk-000000"
     assert source.names[-1] == "minjerk-000999"
 
 
-def test_settings_are_drawn_from_its_names_and_have_no_noise():
+def test_settings_are_drawn_from_the_names_and_have_no_noise():
     source, rng = MinjerkSource(), np.random.default_rng(0)
-    drawn = [source.sample(rng) for _ in range(200)]
-    assert all((s.offset_x, s.offset_y, s.duration_noise) == (0.0, 0.0, 0.0) for s in drawn)
-    assert len({s.reach for s in drawn} & set(source.names)) > 150
-    assert drawn[0] == source.sample(np.random.default_rng(0))
+    settings = [source.sample(rng) for _ in range(200)]
+    assert all((s.offset_x, s.offset_y, s.duration_noise) == (0.0, 0.0, 0.0) for s in settings)
+    assert len({s.reach for s in settings} & set(source.names)) > 150
+    assert settings[0] == source.sample(np.random.default_rng(0))
 
 
-def test_a_name_is_one_path_for_ever():
-    np.testing.assert_allclose(MinjerkSource().path(at("minjerk-000123")).positions[0], FIRST_OF_123, atol=1e-9)
+def test_the_path_of_a_name_never_changes():
+    np.testing.assert_allclose(MinjerkSource().path(setting("minjerk-000123")).positions[0], FIRST_OF_123, atol=1e-9)
 
 
-def test_further_numbers_are_known_and_other_names_are_not():
+def test_larger_numbers_are_valid_and_other_names_are_not():
     source = MinjerkSource()
-    assert len(source.path(at("minjerk-123456"))) == 417
+    assert len(source.path(setting("minjerk-123456"))) == 417
     for name in ("minjerk-1", "minjerk-0000001", "01_fl_01", "Minjerk-000001", "minjerk-000001\n"):
         with pytest.raises(UnknownReach, match="minjerk-000000, minjerk-000001"):
-            source.path(at(name))
+            source.path(setting(name))
         with pytest.raises(UnknownReach):
             source.stratum(name)
 
@@ -66,35 +66,35 @@ def test_offsets_and_noise_are_refused(noise: tuple[float, float, float]):
         MinjerkSource().path(Setting("minjerk-000001", *noise))
 
 
-def test_start_via_point_and_top_by_hand():
+def test_start_via_point_and_top_agree_with_a_calculation_by_hand():
     draw = Draw(radius=0.5, theta=np.pi / 10, height=0.01)
     positions = carrier_positions(draw)
     np.testing.assert_allclose(positions[0], [-0.5 * 0.3090169944, -0.5 * 0.9510565163, 0.1], atol=1e-9)
     np.testing.assert_allclose(positions[250], [-0.045, -0.1, 0.11], atol=1e-5)  # After 5 s.
     np.testing.assert_allclose(positions[-1], [-0.045, -0.1, 0.31], atol=1e-5)
-    assert len(positions) == 1 + 250 + 166  # Half of the ten seconds, and a third.
-    assert MinjerkSource().duration(at("minjerk-000000")) == pytest.approx(8.32)
+    assert len(positions) == 1 + 250 + 166  # Half of ten seconds, then a third.
+    assert MinjerkSource().duration(setting("minjerk-000000")) == pytest.approx(8.32)
     np.testing.assert_allclose(np.ptp(positions[250:, :2], axis=0), 0.0, atol=1e-5)  # Straight up.
 
 
-def test_the_palm_centre_comes_within_the_distance_at_which_experts_close():
-    path = MinjerkSource().path(at("minjerk-000007"))
+def test_the_palm_centre_comes_within_the_distance_at_which_every_expert_closes():
+    path = MinjerkSource().path(setting("minjerk-000007"))
     centre = palm_centre(path.positions, path.quaternions)[250]
     np.testing.assert_allclose(centre[:2], [-0.015, 0.005], atol=1e-4)
     assert np.hypot(*centre[:2]) < policies.ALWAYS_CLOSE
 
 
 def test_a_leg_is_the_minimum_jerk_polynomial():
-    u = np.arange(1, 251) / 250 / 1.01  # The law aims to arrive when its slack has passed too.
+    u = np.arange(1, 251) / 250 / 1.01  # The law aims to arrive at the end of its slack.
     exact = u**3 * (10 - 15 * u + 6 * u**2)
-    found = minimum_jerk_leg(np.zeros(3), np.array([1.0, 0.0, -2.0]), 250)
-    np.testing.assert_allclose(found[:, 0], exact, atol=0.003)
-    np.testing.assert_allclose(found[:, 2], -2.0 * found[:, 0], atol=1e-12)
-    assert (np.diff(found[:245, 0]) > 0).all()
+    positions = minimum_jerk_leg(np.zeros(3), np.array([1.0, 0.0, -2.0]), 250)
+    np.testing.assert_allclose(positions[:, 0], exact, atol=0.003)
+    np.testing.assert_allclose(positions[:, 2], -2.0 * positions[:, 0], atol=1e-12)
+    assert (np.diff(positions[:245, 0]) > 0).all()
 
 
 @given(st.integers(0, 999_999))
-def test_every_draw_lies_in_its_ranges(number: int):
+def test_every_draw_is_in_its_ranges(number: int):
     draw = Draw.from_name(f"minjerk-{number:06d}")
     assert 0.25 <= draw.radius <= 0.60
     assert np.pi / 14 <= draw.theta <= np.pi / 7
@@ -123,7 +123,7 @@ def test_start_regions_go_from_near_to_far_and_from_x_to_y():
 def test_the_papers_expert_lifts_the_bottle():
     names = [name for name in MinjerkSource().names if abs(Draw.from_name(name).height) < 0.01][:3]
     engine, ids = Engine(len(names), threads=1), np.arange(len(names))
-    states = engine.begin(ids, [MinjerkSource().path(at(name)) for name in names])
+    states = engine.begin(ids, [MinjerkSource().path(setting(name)) for name in names])
     first, scores, actions = task.distance(states), np.zeros(len(names)), np.zeros((len(names), 1))
     gain, critical = np.full(len(names), 2.0), np.full(len(names), 0.15)
     for _ in range(375):
@@ -135,5 +135,5 @@ def test_the_papers_expert_lifts_the_bottle():
 
 
 def test_reach_and_lift_take_a_half_and_a_third_of_an_episode():
-    """The world is not imported by the reaches, so its limit of 500 steps stands in two places."""
+    """The package `reaches` does not import the world, so both contain the limit of 500 steps."""
     assert (REACH_STEPS, LIFT_STEPS) == (task.STEP_LIMIT // 2, task.STEP_LIMIT // 3)

@@ -1,4 +1,4 @@
-"""A cache of reaches that holds all or nothing, and comes back bit for bit."""
+"""The cache has all reaches or none, and returns them bit for bit."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ from tests.helpers.small_release import NAMES, SmallRelease
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty cache for each test, and no release named by the environment."""
+    """An empty cache for each test, and no release in the environment."""
     monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("DEXTRON_DATA", raising=False)
     return tmp_path / "cache"
 
 
-def same(a: list[Reach], b: list[Reach]) -> bool:
+def bit_equal(a: list[Reach], b: list[Reach]) -> bool:
+    """True if two lists of reaches agree in every bit."""
+
     def parts(reach: Reach):
         arrays = (reach.times, reach.positions, reach.quaternions)
         return (reach.name, reach.reached, reach.subject, reach.ring, reach.angle, *(x.tobytes() for x in arrays))
@@ -32,31 +34,31 @@ def same(a: list[Reach], b: list[Reach]) -> bool:
     return [parts(reach) for reach in a] == [parts(reach) for reach in b]
 
 
-def test_what_was_imported_comes_back_bit_for_bit(small_release: SmallRelease):
+def test_imported_reaches_are_read_back_bit_for_bit(small_release: SmallRelease):
     manifest = Manifest.load(small_release.manifest)
     imported = recorded_cache.import_release(small_release.zip(), manifest)
-    assert same(imported, recorded_cache.load_reaches(manifest))
+    assert bit_equal(imported, recorded_cache.load_reaches(manifest))
 
 
-def test_nothing_anywhere_says_how_to_get_it(small_release: SmallRelease):
+def test_the_error_without_reaches_says_how_to_get_them(small_release: SmallRelease):
     with pytest.raises(recorded_cache.MissingData, match=r"data import --from .*data fetch"):
         recorded_cache.load_reaches(Manifest.load(small_release.manifest))
 
 
-def test_the_environment_names_a_release_where_no_cache_is(
+def test_the_release_in_the_environment_is_read_if_there_is_no_cache(
     small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("DEXTRON_DATA", str(small_release.unpacked()))
     assert [reach.name for reach in recorded_cache.load_reaches(Manifest.load(small_release.manifest))] == list(NAMES)
 
 
-def test_a_cache_of_another_release_does_not_count(small_release: SmallRelease):
+def test_a_cache_of_another_release_is_refused(small_release: SmallRelease):
     recorded_cache.import_release(small_release.zip(), Manifest.load(small_release.manifest))
     with pytest.raises(recorded_cache.MissingData, match="from another release"):
         recorded_cache.load_reaches(Manifest.load())
 
 
-def test_a_changed_cache_does_not_count(small_release: SmallRelease):
+def test_a_changed_cache_is_refused(small_release: SmallRelease):
     manifest = Manifest.load(small_release.manifest)
     recorded_cache.import_release(small_release.zip(), manifest)
     with np.load(recorded_cache.cache_file()) as stored:
@@ -69,7 +71,7 @@ def test_a_changed_cache_does_not_count(small_release: SmallRelease):
 
 
 @pytest.mark.parametrize("size", [0, 10, 400, 2000])
-def test_a_cut_cache_does_not_count(small_release: SmallRelease, size: int):
+def test_a_truncated_cache_is_refused(small_release: SmallRelease, size: int):
     manifest = Manifest.load(small_release.manifest)
     recorded_cache.import_release(small_release.zip(), manifest)
     recorded_cache.cache_file().write_bytes(recorded_cache.cache_file().read_bytes()[:size])
@@ -78,34 +80,29 @@ def test_a_cut_cache_does_not_count(small_release: SmallRelease, size: int):
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_failed_write_leaves_the_cache_as_it_was(
+def test_a_failed_write_does_not_change_the_cache(
     small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch, call: str
 ):
     manifest = Manifest.load(small_release.manifest)
     recorded_cache.import_release(small_release.zip(), manifest)
     before = recorded_cache.cache_file().read_bytes()
 
-    def full(*_: object) -> None:
+    def fail(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(os, call, full)
+    monkeypatch.setattr(os, call, fail)
     with pytest.raises(OSError, match="No space left"):
         recorded_cache.import_release(small_release.zip(), manifest)
     assert recorded_cache.cache_file().read_bytes() == before
     assert os.listdir(recorded_cache.cache_folder()) == [recorded_cache.CACHE_FILE]
 
 
-def test_unknown_sources_are_answered_with_the_known():
-    with pytest.raises(sources.UnknownSource, match="'fake'; choose from minjerk, real, synthetic"):
-        sources.open_source("fake")
-
-
-def test_the_authors_release_is_imported_whole(release: Path):
+def test_the_authors_release_is_imported_completely(release: Path):
     imported = recorded_cache.import_release(release)
     assert len(imported) == 575
     source = sources.open_source("real")
     assert source.names == tuple(sorted(source.names))
     assert source.stratum("09_nr_16").subject == "09"
-    assert same(imported, recorded_cache.load_reaches())
+    assert bit_equal(imported, recorded_cache.load_reaches())
     assert 0.84 < min(reach.duration for reach in imported) < max(reach.duration for reach in imported) < 2.19
     assert all(np.all(np.diff(reach.times) > 0) and 0 < reach.reached < reach.duration for reach in imported)

@@ -1,4 +1,4 @@
-"""Downloads from a server of this process: whole, cut, too large, not there."""
+"""Downloads from a server in this process: complete, truncated, too large, missing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.helpers.small_release import SmallRelease
 
 
 class Server(BaseHTTPRequestHandler):
-    """Serves `content`; /cut announces more than it sends."""
+    """Serves `content`. For /cut it announces more bytes than it sends."""
 
     content = b""
 
@@ -25,11 +25,11 @@ class Server(BaseHTTPRequestHandler):
         self.wfile.write(self.content)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Says nothing."""
+        """Prints nothing."""
 
 
 @pytest.fixture
-def site(small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+def server_url(small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     monkeypatch.setenv("DEXTRON_CACHE", str(small_release.folder / "cache"))
     monkeypatch.setenv("no_proxy", "127.0.0.1")
     monkeypatch.setattr(Server, "content", small_release.zip().read_bytes())
@@ -42,22 +42,24 @@ def site(small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch) -> Iterat
     server.server_close()
 
 
-def test_fetch_imports_what_it_downloads(small_release: SmallRelease, site: str):
-    heard: list[tuple[int, int]] = []
+def test_fetch_imports_the_downloaded_release(small_release: SmallRelease, server_url: str):
+    progress: list[tuple[int, int]] = []
     manifest = release.Manifest.load(small_release.manifest)
-    fetched = download.fetch(manifest, lambda done, total: heard.append((done, total)), url=f"{site}/release.zip")
-    assert len(fetched) == 3 == len(cache.load_reaches(manifest))
-    assert heard[-1] == (len(Server.content), len(Server.content))
+    reaches = download.fetch(
+        manifest, lambda done, total: progress.append((done, total)), url=f"{server_url}/release.zip"
+    )
+    assert len(reaches) == 3 == len(cache.load_reaches(manifest))
+    assert progress[-1] == (len(Server.content), len(Server.content))
 
 
 @pytest.mark.parametrize(("page", "reason"), [("none", "the server answers 404"), ("cut", "the connection broke")])
-def test_a_download_that_fails_says_why(site: str, page: str, reason: str):
+def test_the_error_of_a_failed_download_has_the_reason(server_url: str, page: str, reason: str):
     with pytest.raises(download.FetchError, match=reason):
-        download.download(f"{site}/{page}", io.BytesIO())
+        download.download(f"{server_url}/{page}", io.BytesIO())
 
 
-def test_a_download_stops_at_its_limit(site: str):
+def test_a_download_stops_at_its_limit(server_url: str):
     target = io.BytesIO()
     with pytest.raises(download.FetchError, match="has more than 100 bytes"):
-        download.download(f"{site}/release.zip", target, limit=100)
+        download.download(f"{server_url}/release.zip", target, limit=100)
     assert target.getvalue() == b""
