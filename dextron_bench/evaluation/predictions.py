@@ -15,15 +15,15 @@ from dextron_bench.world import task
 class StepPredictions:
     """What a recording shows of an episode of T steps besides the episode's own arrays.
 
-    `curves` (T, A) are the predicted probabilities of success of the actions `grid` (A,) from -1 to 1. `chances` (T,)
-    are the probabilities for the actions that the agent took. `experts` (T,) are the actions of the setting's expert in
-    the same states. `duration` is the length of the reach [control steps].
+    `curves` (T, A) are the predicted probabilities of success of the actions `grid` (A,) from -1 to 1. `probabilities`
+    (T,) are the predicted probabilities of success of the actions that the agent took. `expert_actions` (T,) are the
+    actions of the setting's expert in the same states. `duration` is the length of the reach [control steps].
     """
 
     grid: np.ndarray
     curves: np.ndarray
-    chances: np.ndarray
-    experts: np.ndarray
+    probabilities: np.ndarray
+    expert_actions: np.ndarray
     duration: float
 
 

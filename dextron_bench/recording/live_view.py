@@ -37,14 +37,14 @@ class LiveView:
         self._last = min(len(path.positions) - 1 + task.HOLD, task.STEP_LIMIT)
 
     def show(self, states: np.ndarray, actions: np.ndarray, predictions: StepPredictions) -> None:
-        """Shows the last step; states (T, 48), actions (T, 1) and predictions are those of all steps so far."""
+        """Shows the last step; takes states (T, 48), actions (T, 1) and predictions of all steps so far."""
         now = len(states) - 1
         before = max(now - 1, 0)
         last = StepPredictions(
             predictions.grid,
             predictions.curves[now:],
-            predictions.chances[now:],
-            predictions.experts[now:],
+            predictions.probabilities[now:],
+            predictions.expert_actions[now:],
             predictions.duration,
         )
         chunks = [*scene.chunks(states[before:], before), *blueprint.signals(states[now:], now)]

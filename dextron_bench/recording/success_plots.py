@@ -23,13 +23,13 @@ THRESHOLD = 0.5  # The model predicts success if the chance is above this.
 
 def chunks(predictions: StepPredictions, actions: np.ndarray, first: int = 0) -> Iterable[Chunk]:
     """Predictions at each step, which the viewer shows at the cursor, for the actions (T, 1) from step `first` on."""
-    steps = len(predictions.chances)
+    steps = len(predictions.probabilities)
     times = scene.timelines(first, first + steps - 1)
-    chances = np.stack([predictions.chances, np.full(steps, THRESHOLD)], axis=1)
+    chances = np.stack([predictions.probabilities, np.full(steps, THRESHOLD)], axis=1)
     yield Chunk.from_columns("/success/chance", times, rr.Scalars.columns(scalars=chances))
-    yield Chunk.from_columns("/signals/expert", times, rr.Scalars.columns(scalars=predictions.experts))
+    yield Chunk.from_columns("/signals/expert", times, rr.Scalars.columns(scalars=predictions.expert_actions))
     yield Chunk.from_columns("/success/curve", times, rr.BarChart.columns(values=_tensors(predictions.curves)))
-    chosen = rr.BarChart.columns(values=_tensors(predictions.chances[:, None]), abscissa=_tensors(actions))
+    chosen = rr.BarChart.columns(values=_tensors(predictions.probabilities[:, None]), abscissa=_tensors(actions))
     yield Chunk.from_columns("/success/chosen", times, chosen)
 
 
@@ -46,7 +46,7 @@ def ridge(predictions: StepPredictions, actions: np.ndarray, last: int, success:
     )
     strips = strips.astype(np.float32)
     shown = np.arange(0, steps, max(1, last // RIDGES))
-    correct = (predictions.chances[shown] > THRESHOLD) == success
+    correct = (predictions.probabilities[shown] > THRESHOLD) == success
     colours = np.where(correct[:, None], RIGHT, WRONG) if success is not None else np.array([BARS])
     ticks = np.stack([actions, base, actions, base - RISE / 2], axis=1).reshape(-1, 2, 2).astype(np.float32)
     lines, tick_colours = [*strips[shown], *ticks[shown]], np.tile(TICK, (len(shown), 1))

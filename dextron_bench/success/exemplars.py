@@ -44,12 +44,12 @@ class PredictedEpisode:
     @property
     def times(self) -> np.ndarray:
         """Time of each step (T,), as a share of the reach's duration."""
-        return np.arange(len(self.predictions.chances)) / self.predictions.duration
+        return np.arange(len(self.predictions.probabilities)) / self.predictions.duration
 
     @property
     def correct(self) -> np.ndarray:
         """True for the steps (T,) at which the model predicts the outcome correctly."""
-        return (self.predictions.chances > 0.5) == self.episode.success
+        return (self.predictions.probabilities > 0.5) == self.episode.success
 
     @property
     def accuracy(self) -> float:
@@ -84,7 +84,7 @@ def choose(episodes: Iterable[PredictedEpisode]) -> dict[str, PredictedEpisode]:
 
 def _clearness(predicted: PredictedEpisode) -> dict[str, float]:
     """How clearly an episode shows its kind; empty if it is of no kind."""
-    curves, chances = predicted.predictions.curves, predicted.predictions.chances
+    curves, chances = predicted.predictions.curves, predicted.predictions.probabilities
     is_policy, success = predicted.player != EXPERT, predicted.episode.success
     if is_policy and not success:  # An expert's mistake does not explain a policy.
         if predicted.diagnosis.cause == "too early":

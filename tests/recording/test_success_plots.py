@@ -59,11 +59,11 @@ def test_curves_chances_and_actions_come_back(columns: dict[str, pa.RecordBatch]
         tensors(columns["/success/curve"], "BarChart:values"), predictions.curves.astype("f4")
     )
     chosen = columns["/success/chosen"]
-    np.testing.assert_array_equal(tensors(chosen, "BarChart:values")[:, 0], predictions.chances.astype("f4"))
+    np.testing.assert_array_equal(tensors(chosen, "BarChart:values")[:, 0], predictions.probabilities.astype("f4"))
     np.testing.assert_array_equal(tensors(chosen, "BarChart:abscissa")[:, 0], episode.actions[:, 0].astype("f4"))
-    assert flat(columns["/signals/expert"], "Scalars:scalars").tobytes() == predictions.experts.tobytes()
+    assert flat(columns["/signals/expert"], "Scalars:scalars").tobytes() == predictions.expert_actions.tobytes()
     chances = flat(columns["/success/chance"], "Scalars:scalars").reshape(-1, 2)
-    assert chances[:, 0].tobytes() == predictions.chances.tobytes()
+    assert chances[:, 0].tobytes() == predictions.probabilities.tobytes()
     assert set(chances[:, 1]) == {0.5}
 
 

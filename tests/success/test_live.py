@@ -55,8 +55,8 @@ def test_every_step_is_shown_as_it_is_taken():
     for step, (states, actions, predictions) in enumerate(recorder.shown, start=1):
         np.testing.assert_array_equal(states, episode.states[:step])
         np.testing.assert_array_equal(actions, episode.actions[:step])
-        assert len(predictions.curves) == len(predictions.chances) == step
-    np.testing.assert_array_equal(recorder.shown[-1][2].experts, episode.actions[:, 0])
+        assert len(predictions.curves) == len(predictions.probabilities) == step
+    np.testing.assert_array_equal(recorder.shown[-1][2].expert_actions, episode.actions[:, 0])
     np.testing.assert_array_equal(recorder.shown[-1][2].curves, MODEL.curve(episode.states[:-1]))
     assert recorder.outcome == episode.success
 
