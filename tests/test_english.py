@@ -22,13 +22,11 @@ TO_DO: tuple[str, ...] = (  # Folders and files that are not rewritten yet.
     "dextron_bench/leaderboard/baseline_check.py",
     "dextron_bench/leaderboard/submission",
     "dextron_bench/methods",
-    "dextron_bench/reaches",
     "dextron_bench/recording",
     "dextron_bench/runs",
     "dextron_bench/storage",
     "dextron_bench/success",
     "dextron_bench/training",
-    "dextron_bench/world",
     "docs",
     "tests/baselines",
     "tests/benchmarks",
@@ -38,14 +36,12 @@ TO_DO: tuple[str, ...] = (  # Folders and files that are not rewritten yet.
     "tests/helpers",
     "tests/leaderboard",
     "tests/methods",
-    "tests/reaches",
     "tests/recording",
     "tests/runs",
     "tests/shipped",
     "tests/splits",
     "tests/storage",
     "tests/training",
-    "tests/world",
 )
 
 # Each pattern with a plain replacement.

@@ -59,7 +59,7 @@ class Source(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stratum:
-    """The groups of a reach, by which results are broken down: subject and start region (ring 0 to 3, angle 0 to 3)."""
+    """The groups of a reach, for results by group: subject and start region (ring 0 to 3, angle 0 to 3)."""
 
     subject: str
     ring: int
