@@ -57,7 +57,7 @@ def write(
     """Writes an episode on the palm's `path` to `file` atomically; returns the SHA-256 of the file.
 
     With `predictions` the recording also shows what the success model predicts at each step. Raises
-    UnwritableRecording, and ValueError if the arrays are not those of an episode.
+    UnwritableRecording, and ValueError if the arrays do not form an episode.
     """
     rr.set_strict_mode(True)
     chunks = [*_chunks(episode, properties), scene.planned_path(path), *scene.chunks(episode.states)]
@@ -91,7 +91,7 @@ def read(file: Path, sha256: str | None = None) -> Recording:
         arrays = {name: _array(content, name) for name in ARRAYS}
         episode = Episode(setting, **arrays, **{name: values[name] for name in ENDS})
     except (ValueError, TypeError) as error:
-        raise BrokenRecording(file, f"holds arrays that are not those of an episode ({error})") from error
+        raise BrokenRecording(file, f"holds arrays that do not form an episode ({error})") from error
     except (KeyError, StopIteration) as error:
         lacking = f"it lacks {error}" if isinstance(error, KeyError) else "it lacks an array"
         raise BrokenRecording(file, f"is a recording of another version of {APPLICATION}: {lacking}") from error

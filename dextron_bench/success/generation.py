@@ -103,9 +103,7 @@ def generate(
     """
     if rows < 1:
         raise BadDatasetConfig(f"--rows is the number of transitions to generate, 1 or more, not {rows}")
-    content = {"search": asdict(config), "physics": model.mjcf_hash()}
-    advice = "choose another folder, or remove it"
-    folder_config.write_or_check_file(folder / dataset.CONFIG, content, "data set", advice)
+    _write_or_check_config(folder, config)
     tallies, number = {kind: Tally() for kind in KINDS}, 0
     while (done := sum(tally.rows for tally in tallies.values())) < rows:
         progress(done, rows)
@@ -128,6 +126,12 @@ def block_tally(file: Path) -> Tally:
     """The tally of a block; raises BadDataset, OSError."""
     arrays = dataset.open_block(file)
     return Tally(len(arrays["actions"]), len(arrays["solved"]), int(arrays["solved"].sum()))
+
+
+def _write_or_check_config(folder: Path, config: DatasetConfig) -> None:
+    content = {"search": asdict(config), "physics": model.mjcf_hash()}
+    advice = "choose another folder, or remove it"
+    folder_config.write_or_check_file(folder / dataset.CONFIG, content, "data set", advice)
 
 
 def _play(source: Source, cases: Sequence[Case], agent: Agent, threads: int, file: Path) -> None:

@@ -21,7 +21,7 @@ CLIP = 10.0  # Scaled states are clipped to [-CLIP, CLIP].
 
 
 class BadModel(ValueError):
-    """The arrays are not those of a success model."""
+    """The arrays do not form a success model."""
 
 
 class MissingModel(LookupError):
@@ -48,7 +48,7 @@ class SuccessModel:
         return self._chances(self._hidden(states) + actions[:, None] * self._action_weights)
 
     def curve(self, states: np.ndarray) -> np.ndarray:
-        """The chances (N, 51) of the actions of GRID in states (N, 48), bit-equal to those of `chance`."""
+        """The chances (N, 51) of the actions of GRID in states (N, 48), bit-equal to the results of `chance`."""
         hidden = self._hidden(states)[:, None] + GRID[:, None] * self._action_weights
         return self._chances(hidden.reshape(-1, HIDDEN)).reshape(-1, len(GRID))
 

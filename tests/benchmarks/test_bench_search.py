@@ -24,6 +24,7 @@ from tests.benchmarks.workload import default_source
 SETTINGS, ROUNDS = 128, 2
 PAPER = 1 / 90  # Rows with a return above 1 per second and thread on the paper's cluster.
 THREADS = os.cpu_count() or 1
+SEARCH = "Draws of a search, 8 experts from one rollout"
 
 
 class TimedSource:
@@ -63,23 +64,23 @@ def test_search_with_branching(benchmark: BenchmarkFixture):
     seconds, reference_seconds = time_in_turns(benchmark, branched, one_by_one, ROUNDS)
     assert all((returns == results[0]).all() for returns in results)
     rows = int((results[0] > blocks.KEPT).sum())
-    rate = rows / (seconds * THREADS)
-    against = "one rollout for each draw, the same draws"
-    draws_per_second = len(draws) / seconds, len(draws) / reference_seconds
-    rows_text, unit = f"Rows with a return above 1 ({rows} rows)", "rows/core-second"
     store_rows(
         benchmark,
-        Row(
-            "Draws of a search, 8 experts from one rollout",
-            "draws/s",
-            draws_per_second[0],
-            against,
-            draws_per_second[1],
-        ),
-        Row(rows_text, unit, rate, against, rows / (reference_seconds * THREADS)),
-        Row(rows_text, unit, rate, "the paper's one in 90 thread-seconds", PAPER),
+        *search_rows(len(draws), rows, seconds, reference_seconds),
         Row("Share of a search spent on paths", "", source.seconds / seconds),
     )
+
+
+def search_rows(draws: int, kept: int, seconds: float, reference_seconds: float) -> list[Row]:
+    """Lines of the table for a search that keeps `kept` of its draws."""
+    against = "one rollout for each draw, the same draws"
+    what, unit = f"Rows with a return above 1 ({kept} rows)", "rows/core-second"
+    rate = kept / (seconds * THREADS)
+    return [
+        Row(SEARCH, "draws/s", draws / seconds, against, draws / reference_seconds),
+        Row(what, unit, rate, against, kept / (reference_seconds * THREADS)),
+        Row(what, unit, rate, "the paper's one in 90 thread-seconds", PAPER),
+    ]
 
 
 def test_open_recorded_reaches(

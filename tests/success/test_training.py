@@ -18,37 +18,53 @@ from tests.success.test_generation import file_contents
 SHORT = TrainingConfig(epochs=2, updates=3, batch=8)
 
 
-def test_a_stopped_training_ends_with_the_same_bytes(tmp_path: Path):
-    for folder in ("a", "b", "c"):
-        write_block(tmp_path / folder, 0, [30] * 10, [0, 1] * 5)
-    train(tmp_path / "a", SHORT)
-    train(tmp_path / "c", replace(SHORT, epochs=1))
-    train(tmp_path / "c", SHORT)
-    assert file_contents(tmp_path / "a") == file_contents(tmp_path / "c")
-    with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
-        train(tmp_path / "c", replace(SHORT, epochs=1))
+@pytest.fixture
+def trained(tmp_path: Path) -> Path:
+    """A folder with a data set and a finished training."""
+    write_block(tmp_path / "trained", 0, [30] * 10, [0, 1] * 5)
+    train(tmp_path / "trained", SHORT)
+    return tmp_path / "trained"
+
+
+def test_a_stopped_training_ends_with_the_same_bytes(trained: Path, tmp_path: Path):
+    write_block(tmp_path / "stopped", 0, [30] * 10, [0, 1] * 5)
 
     def stop(done: int, total: int, note: str = "") -> None:
         if done == 1:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(tmp_path / "b", SHORT, stop)
-    train(tmp_path / "b", SHORT)
-    assert file_contents(tmp_path / "a") == file_contents(tmp_path / "b")
-    about = tensors.read_about(tmp_path / "a" / MODEL)
+        train(tmp_path / "stopped", SHORT, stop)
+    train(tmp_path / "stopped", SHORT)
+    assert file_contents(tmp_path / "stopped") == file_contents(trained)
+
+
+def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path, tmp_path: Path):
+    write_block(tmp_path / "continued", 0, [30] * 10, [0, 1] * 5)
+    train(tmp_path / "continued", replace(SHORT, epochs=1))
+    train(tmp_path / "continued", SHORT)
+    assert file_contents(tmp_path / "continued") == file_contents(trained)
+    with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
+        train(tmp_path / "continued", replace(SHORT, epochs=1))
+
+
+def test_the_model_keeps_its_learning_curve_and_its_best_epoch(trained: Path):
+    about = tensors.read_about(trained / MODEL)
     assert [point["epoch"] for point in about["curve"]] == [1, 2]
     losses = [point["test_loss"] for point in about["curve"]]
     assert losses[about["best_epoch"] - 1] == min(losses)
+
+
+def test_other_settings_impossible_settings_and_a_model_as_state_are_refused(trained: Path):
     with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
-        train(tmp_path / "a", TrainingConfig(epochs=2, updates=4, batch=8))
+        train(trained, TrainingConfig(epochs=2, updates=4, batch=8))
     with pytest.raises(BadTrainingConfig, match="above 0"):
         TrainingConfig(updates=0)
     with pytest.raises(BadTrainingConfig, match="0 or more, not -1"):
         TrainingConfig(seed=-1)
-    shutil.copyfile(tmp_path / "a" / MODEL, tmp_path / "a" / STATE)
+    shutil.copyfile(trained / MODEL, trained / STATE)
     with pytest.raises(tensors.BadTensors, match=r"fit\.safetensors .*not an unfinished training"):
-        train(tmp_path / "a", SHORT)
+        train(trained, SHORT)
 
 
 def test_the_model_is_from_the_epoch_with_the_lowest_held_out_loss(tmp_path: Path):
