@@ -29,8 +29,8 @@ def estimate(
 ) -> list[dict[str, Any]]:
     """A row for each training and each evaluation with work left, in their order; writes no files of a run.
 
-    Runs of a group differ only in their seeds. `left` is in words; `seconds` is an estimate: for epochs from earlier
-    ones, else from a timing run; for episodes from some that experts play. Raises the errors of `execution.train`.
+    Runs of a group differ only in their seeds. `left` is in words. `seconds` is an estimate, for epochs from earlier
+    epochs or a timing run, and for episodes from episodes that experts play. Raises the errors of `execution.train`.
     """
     rows: dict[str, dict[str, Any]] = {}
     for group in groups:

@@ -1,4 +1,4 @@
-"""Executes runs: trains if the method learns, evaluates on splits, records episodes, writes the result."""
+"""Executes runs: trains the learner if there is one, evaluates on splits, records episodes, writes the result."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Played = Iterator[tuple[int, Episode]]  # Rows and their episodes, as these end.
 def train(
     group: Sequence[Run], runs: Path, threads: int = 0, device: str = "cpu", report: Progress = no_progress
 ) -> None:
-    """Trains what runs need that differ only in their seeds, all seeds together; trained seeds are left as they are.
+    """Trains the learner of runs that differ only in their seeds, all seeds together; skips seeds that are trained.
 
     `report` receives epochs. Raises the errors of `execute`, and Diverged, Busy, NoDevice.
     """
@@ -49,16 +49,16 @@ def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progre
     splits = [load_split(run.source, name) for name in run.splits]
     source = sources.open_source(run.source)
     train([run], runs, threads)
-    given = _weights_file(run, runs)
-    privileged = isinstance(agent(run, given), Privileged)  # Raises before there is a folder.
+    weights_file = _weights_file(run, runs)
+    privileged = isinstance(agent(run, weights_file), Privileged)  # If this raises, there is no folder yet.
     folder_config.write_or_check(folder.path, run.config())
-    own = run_files.copy_weights(given, folder) if given else None
+    copy = run_files.copy_weights(weights_file, folder) if weights_file else None
 
     def play(split: Split) -> Played:
-        return rollout(agent(run, own), source, split.cases, threads=threads)
+        return rollout(agent(run, copy), source, split.cases, threads=threads)
 
     episodes = evaluate(folder, source, splits, play, run.plan.record, run.about, report)
-    about = run.about | _training_facts(run, own) | ({"privileged": "each setting's expert"} if privileged else {})
+    about = run.about | _training_facts(run, copy) | ({"privileged": "each setting's expert"} if privileged else {})
     job = run.training_job(runs)
     result_files.write_result(folder, episodes, about, job.seconds(run.seed) if job else None)
     return folder.path
@@ -85,8 +85,8 @@ def evaluate(
 ) -> pd.DataFrame:
     """The table of episodes of a run; plays the splits that the folder lacks and stores the table after each.
 
-    `play` yields (row, episode) of a split as episodes end. The first `record` rows are recorded; `about` goes into
-    their properties.
+    `play` plays a split and yields (row, episode) as episodes end. The first `record` rows are recorded, with `about`
+    among their properties.
     """
     table = run_files.stored_episodes(folder, splits)
     for split in splits:

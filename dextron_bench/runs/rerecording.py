@@ -49,7 +49,7 @@ def rerecord(table: pd.DataFrame, report: Progress = no_progress) -> list[Path]:
 
 
 def _faults(files: Sequence[Path], rows: Sequence[dict[Any, Any]]) -> list[str]:
-    """Why each file is not the recording of its row; empty if it is."""
+    """For each file, why it is not the recording of its row; empty if it is."""
     summaries = recording.summarise([file for file in files if file.exists()])
     return [_fault(next(summaries), row) if file.exists() else MISSING for file, row in zip(files, rows, strict=True)]
 
@@ -58,8 +58,8 @@ def _fault(summary: recording.Summary, row: dict[Any, Any]) -> str:
     if summary.damage:
         return summary.damage
     expected = {"split_digest": row["digest"], "episode_return": row["score"], "steps": row["length"]}
-    other = [name for name, value in expected.items() if summary.properties.get(name) != value]
-    return f"is of an episode with another {other[0].replace('_', ' ')}" if other else ""
+    differing = [name for name, value in expected.items() if summary.properties.get(name) != value]
+    return f"is of an episode with another {differing[0].replace('_', ' ')}" if differing else ""
 
 
 def _check_playable(row: dict[Any, Any], fault: str) -> None:

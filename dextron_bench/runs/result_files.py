@@ -14,7 +14,7 @@ from dextron_bench.methods.registry import NAME
 from dextron_bench.storage import atomic
 from dextron_bench.storage.run_folder import RunFolder, run_folders, seed_folders
 
-MAKER = ("method", "code", "settings")  # Entries of a run's config that a result repeats: they make the agent again.
+MAKER = ("method", "code", "settings")  # Entries of the config in the result; with them the agent can be made again.
 Results = Sequence[dict[str, Any]]
 
 
@@ -100,8 +100,8 @@ def _files(name: str, runs: Path) -> list[Path]:
     """The files of a method's results, from the first place that has some."""
     if NAME.fullmatch(name):
         for folder in (runs, published_results()):
-            if labelled := finished(folder, name):
-                return [run.result for run in labelled]
+            if finished_runs := finished(folder, name):
+                return [run.result for run in finished_runs]
     path = Path(name)
     if path.is_file():
         return [path]

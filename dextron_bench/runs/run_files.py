@@ -15,7 +15,7 @@ from dextron_bench.storage.run_folder import RunFolder
 
 
 def stored_episodes(folder: RunFolder, splits: Sequence[Split]) -> pd.DataFrame:
-    """Episodes stored in the folder, without those of a split that has changed since; raises DamagedFile."""
+    """The stored table of episodes, without the episodes of splits that changed since; raises DamagedFile."""
     file = folder.episodes
     if not file.exists():
         return pd.DataFrame()

@@ -1,4 +1,4 @@
-"""Selects what to look at: the recordings at a place, or episodes from the tables of runs."""
+"""Selects episodes to view: all recordings at a place, or episodes from the tables of runs."""
 
 from __future__ import annotations
 
@@ -50,15 +50,15 @@ class EpisodeFilter:
 
 
 def recordings(places: Sequence[Path]) -> list[Path]:
-    """The recordings at places, each a recording or a folder; raises NoEpisodes."""
+    """The recordings at places, which are recordings or folders; each file once. Raises NoEpisodes."""
     files: dict[Path, None] = {}
     for place in places:
         if not place.exists():
             raise NoEpisodes(f"{place} does not exist; `dextron-bench run --record 3` makes recordings, in runs")
-        here = [place] if place.is_file() else sorted(file for file in place.glob("**/*.rrd") if file.is_file())
-        if not here:
+        place_files = [place] if place.is_file() else sorted(file for file in place.glob("**/*.rrd") if file.is_file())
+        if not place_files:
             raise NoEpisodes(f"no recordings at {place}; make some with `dextron-bench run --record 3`")
-        files |= dict.fromkeys(here)
+        files |= dict.fromkeys(place_files)
     return list(files)
 
 
@@ -86,7 +86,7 @@ def run_identity(run: RunFolder) -> dict[str, Any]:
     """Method, source of reaches and seed of a run, as its recordings have them; raises DamagedFile."""
     if run.result.exists():
         content = result_files.read_result(run.result)
-    else:  # A run without a result yet; its path has the label.
+    else:  # The run is not finished; its path has the label.
         content = atomic.read_json(run.config) | {"method": run.label}
     try:
         return {name: content[name] for name in ("method", "reaches", "seed")}
@@ -94,28 +94,28 @@ def run_identity(run: RunFolder) -> dict[str, Any]:
         raise atomic.DamagedFile(run.config, f"it lacks {error}") from error
 
 
-def select(table: pd.DataFrame, wanted: EpisodeFilter) -> tuple[pd.DataFrame, int]:
+def select(table: pd.DataFrame, episode_filter: EpisodeFilter) -> tuple[pd.DataFrame, int]:
     """The episodes that a filter selects, and the number that pass it; raises NoEpisodes."""
-    passing = matching(table, wanted)
+    passing = matching(table, episode_filter)
     played = passing[passing["length"] > 0]
     if played.empty:
         unplayed = "; the agent failed before their first step" if len(passing) else ""
         raise NoEpisodes(f"{len(passing)} of {len(table)} episodes pass the filter{unplayed}")
-    if wanted.worst is None and wanted.best is None:
+    if episode_filter.worst is None and episode_filter.best is None:
         return played.head(LIMIT), len(played)
-    worst = played.sort_values("score", kind="stable").head(wanted.worst or 0)
-    best = played.sort_values("score", ascending=False, kind="stable").head(wanted.best or 0)
+    worst = played.sort_values("score", kind="stable").head(episode_filter.worst or 0)
+    best = played.sort_values("score", ascending=False, kind="stable").head(episode_filter.best or 0)
     selected = pd.concat([worst, best])
     return selected[~selected.index.duplicated()], len(played)
 
 
-def matching(table: pd.DataFrame, wanted: EpisodeFilter) -> pd.DataFrame:
-    """The episodes that pass a filter, whatever their number; raises NoEpisodes."""
+def matching(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.DataFrame:
+    """All episodes that pass a filter, without its limit on their number; raises NoEpisodes."""
     for name in ("method", "reaches", "split", "seed", "row", "cause"):
-        if values := getattr(wanted, name):
+        if values := getattr(episode_filter, name):
             _check(table, name, values)
             table = table[table[name].isin(values)]
-    return table[~table["success"]] if wanted.failed else table
+    return table[~table["success"]] if episode_filter.failed else table
 
 
 def _runs(places: Sequence[Path]) -> list[RunFolder]:
@@ -124,10 +124,10 @@ def _runs(places: Sequence[Path]) -> list[RunFolder]:
     for place in places:
         if place.is_file():
             raise NoEpisodes(f"{place} is a file, and episodes are selected from runs; name a run's folder instead")
-        here = list(below(place, RunFolder(place).episodes.name))
-        if not here:
+        place_runs = list(below(place, RunFolder(place).episodes.name))
+        if not place_runs:
             raise NoEpisodes(f"no runs at {place} to select episodes from; make one with `dextron-bench run`")
-        runs |= dict.fromkeys(here)
+        runs |= dict.fromkeys(place_runs)
     return list(runs)
 
 

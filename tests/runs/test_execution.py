@@ -1,4 +1,4 @@
-"""Runs: what is done is not done again, a killed run ends as an unbroken one, and damage is told."""
+"""Runs: finished work is not repeated, a killed run ends with the same bytes, and damaged files are named."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from baselines import floors
 from dextron_bench import recording
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
+from dextron_bench.methods import registry
 from dextron_bench.reaches.setting import from_frame
 from dextron_bench.runs import execution, result_files
 from dextron_bench.runs.plans import Plan, resolve
@@ -23,7 +25,7 @@ from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import atomic, provenance
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
-from tests.helpers import tiny_benchmark
+from tests.helpers import tiny_benchmark, tiny_training
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 PLAN = Plan("exp", "synthetic", ("val", "test"), seed=0)
@@ -41,7 +43,7 @@ class Mine:
 
 @pytest.fixture(autouse=True)
 def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Tiny splits of short reaches; and a provenance that no one's commit changes meanwhile."""
+    """Tiny splits of short reaches, and a provenance that does not depend on the commit."""
     tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.setattr(provenance, "collect", lambda physics: {"git": "abc"})
     yield
@@ -53,7 +55,7 @@ def play(folder: Path, plan: Plan = PLAN) -> Path:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files but recordings, whose row ids are random."""
+    """All files except recordings, because their row ids are random."""
     files = (file for file in folder.rglob("*") if file.is_file() and file.suffix != ".rrd")
     return {str(file.relative_to(folder)): file.read_bytes() for file in files}
 
@@ -65,10 +67,10 @@ def agent(tmp_path: Path, value: str) -> str:
 
 
 def forbid(*_: object, **__: object) -> Any:
-    raise AssertionError("this was already done")
+    raise AssertionError("repeated finished work")
 
 
-def test_a_run_again_computes_nothing_and_changes_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_second_execution_computes_nothing_and_changes_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     folder = play(tmp_path)
     before = contents(folder)
     assert set(before) == {"config.json", "provenance.json", "episodes.parquet", "result.json"}
@@ -77,8 +79,8 @@ def test_a_run_again_computes_nothing_and_changes_no_byte(tmp_path: Path, monkey
     assert contents(folder) == before
 
 
-def test_killed_between_splits_it_ends_with_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    whole = contents(play(tmp_path / "whole"))
+def test_a_run_killed_between_splits_ends_with_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    unbroken = contents(play(tmp_path / "unbroken"))
 
     def killed(agent: object, source: object, cases: list, **options: Any) -> Any:
         if len(cases) == 2:  # Split test.
@@ -92,14 +94,14 @@ def test_killed_between_splits_it_ends_with_the_same_bytes(tmp_path: Path, monke
     broken = tmp_path / "broken" / "exp" / "synthetic" / "seed0"
     assert not (broken / "result.json").exists()
     assert pd.read_parquet(broken / "episodes.parquet")["split"].tolist() == ["val"]
-    assert contents(play(tmp_path / "broken")) == whole
+    assert contents(play(tmp_path / "broken")) == unbroken
 
 
-def test_killed_between_its_first_two_files_it_still_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Whichever of config and provenance is written first, a run that has one of them goes on."""
+def test_a_run_killed_between_its_first_two_files_still_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Config and provenance are separate files; a run that has only one of them continues."""
     written = []
 
-    def once(file: Path, value: object) -> None:
+    def write_once(file: Path, value: object) -> None:
         if written:
             raise KeyboardInterrupt
         written.append(file)
@@ -107,38 +109,38 @@ def test_killed_between_its_first_two_files_it_still_ends(tmp_path: Path, monkey
 
     write_json = atomic.write_json
     with monkeypatch.context() as patched:
-        patched.setattr(atomic, "write_json", once)
+        patched.setattr(atomic, "write_json", write_once)
         with pytest.raises(KeyboardInterrupt):
             play(tmp_path)
     assert (play(tmp_path) / "result.json").exists()
 
 
-def test_the_result_is_what_the_episodes_say(tmp_path: Path):
+def test_the_result_is_computed_from_the_episodes(tmp_path: Path):
     folder = play(tmp_path)
     episodes, result = pd.read_parquet(folder / "episodes.parquet"), result_files.read_result(folder / "result.json")
     assert (result["method"], result["reaches"], result["seed"]) == ("exp", "synthetic", 0)
     assert set(result["splits"]) == {"val", "test"}
-    for name, found in result["splits"].items():
+    for name, split in result["splits"].items():
         rows = episodes[episodes["split"] == name]
         assert rows["row"].tolist() == list(range(len(rows)))
-        assert found["scores"] == rows["score"].tolist() == [20.0] * len(rows)
+        assert split["scores"] == rows["score"].tolist() == [20.0] * len(rows)
         assert set(rows["cause"]) == {"solved"}
         assert rows["closing_lag"].between(0.0, 0.12).all()
-        assert found["digest"] == load_split("synthetic", name).digest
-        assert found["failed"] == 0
+        assert split["digest"] == load_split("synthetic", name).digest
+        assert split["failed"] == 0
     assert episodes["success"].all()
 
 
-def test_its_actions_play_every_episode_again(tmp_path: Path):
+def test_the_stored_actions_reproduce_every_episode(tmp_path: Path):
     rows = pd.read_parquet(play(tmp_path) / "episodes.parquet")
-    again = dict(replay(SOURCE, from_frame(rows), rows["actions"].tolist(), threads=1))
-    assert [again[k].score for k in range(len(rows))] == rows["score"].tolist()
-    assert [len(again[k].actions) for k in range(len(rows))] == rows["length"].tolist()
+    replayed = dict(replay(SOURCE, from_frame(rows), rows["actions"].tolist(), threads=1))
+    assert [replayed[k].score for k in range(len(rows))] == rows["score"].tolist()
+    assert [len(replayed[k].actions) for k in range(len(rows))] == rows["length"].tolist()
 
 
 def test_actions_that_end_before_the_episode_fail_it():
-    (_, found), (_, empty) = sorted(replay(SOURCE, [SETTINGS[0]] * 2, [np.zeros(3), np.zeros(0)], threads=1))
-    assert (found.failure, empty.failure) == ("action is nan at step 3", "action is nan at step 0")
+    (_, short), (_, empty) = sorted(replay(SOURCE, [SETTINGS[0]] * 2, [np.zeros(3), np.zeros(0)], threads=1))
+    assert (short.failure, empty.failure) == ("action is nan at step 3", "action is nan at step 0")
 
 
 def test_a_recording_reads_back_as_the_episode(tmp_path: Path):
@@ -151,31 +153,30 @@ def test_a_recording_reads_back_as_the_episode(tmp_path: Path):
     assert recorded.episode.setting == split.cases[0].setting
     for name in ("states", "actions", "rewards"):
         np.testing.assert_array_equal(getattr(recorded.episode, name), getattr(episode, name))
-    told = {name: recorded.properties[name] for name in ("method", "reaches", "split", "split_digest", "row", "seed")}
-    assert told == {
+    properties = {
+        name: recorded.properties[name] for name in ("method", "reaches", "split", "split_digest", "row", "seed")
+    }
+    assert properties == {
         "method": "exp", "reaches": "synthetic", "split": "test", "split_digest": split.digest, "row": 0, "seed": 3,
     }  # fmt: skip
 
 
-def test_a_missing_recording_is_made_and_one_that_cannot_be_is_not_missed(
+def test_an_episode_without_a_step_is_not_recorded_and_not_played_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    made = []
-    monkeypatch.setattr(recording, "write", lambda file, *_: (file.parent.mkdir(exist_ok=True), made.append(file.name)))
+    monkeypatch.setattr(recording, "write", forbid)
     spec = agent(tmp_path, "np.nan")
     plan = Plan(spec, "synthetic", ("open",), seed=0, record=1)
     folder = play(tmp_path, plan)
-    assert made == []  # An episode that failed before its first step.
     assert result_files.read_result(folder / "result.json")["splits"]["open"] == {
         "digest": load_split("synthetic", "open").digest, "scores": [0.0], "failed": 1,
         "causes": {"agent failed": 1}, "closing_lag": None, "actions": ["af5570f5a181"],
     }  # fmt: skip
     monkeypatch.setattr(execution, "rollout", forbid)
     play(tmp_path, plan)
-    monkeypatch.undo()
 
 
-def test_splits_are_added_to_a_run(tmp_path: Path):
+def test_a_later_execution_adds_splits(tmp_path: Path):
     play(tmp_path, Plan("nothing", "synthetic", ("val",), 0))
     folder = play(tmp_path, Plan("nothing", "synthetic", ("open",), 0))
     assert set(result_files.read_result(folder / "result.json")["splits"]) == {"val", "open"}
@@ -197,7 +198,7 @@ def test_a_changed_split_is_played_again(tmp_path: Path):
     )
 
 
-def test_other_code_in_the_same_folder_is_a_mismatch(tmp_path: Path):
+def test_changed_code_in_the_same_folder_is_a_mismatch(tmp_path: Path):
     spec = agent(tmp_path, "0.0")
     plan = Plan(spec, "synthetic", ("open",), 0)
     play(tmp_path, plan)
@@ -209,12 +210,12 @@ def test_other_code_in_the_same_folder_is_a_mismatch(tmp_path: Path):
         play(tmp_path, plan)
 
 
-def test_a_name_that_another_method_has_is_a_mismatch(tmp_path: Path):
+def test_another_method_of_the_same_name_is_a_mismatch(tmp_path: Path):
     play(tmp_path, Plan("nothing", "synthetic", ("open",), 0))
-    thief = tmp_path / "thief.py"
-    thief.write_text(AGENT.format(value=0.0).replace('"mine"', '"nothing"'))
+    file = tmp_path / "other.py"
+    file.write_text(AGENT.format(value=0.0).replace('"mine"', '"nothing"'))
     with pytest.raises(FolderMismatch, match="differs in code"):
-        play(tmp_path, Plan(f"{thief}:Mine", "synthetic", ("open",), 0))
+        play(tmp_path, Plan(f"{file}:Mine", "synthetic", ("open",), 0))
 
 
 def test_other_physics_in_the_same_folder_is_a_mismatch(tmp_path: Path):
@@ -225,50 +226,42 @@ def test_other_physics_in_the_same_folder_is_a_mismatch(tmp_path: Path):
         play(tmp_path, plan)
 
 
-@pytest.mark.parametrize("file", ["episodes.parquet", "config.json", "provenance.json"])
-def test_a_damaged_file_is_named_with_what_to_do(tmp_path: Path, file: str):
+@pytest.mark.parametrize("name", ["episodes.parquet", "config.json", "provenance.json"])
+def test_a_damaged_file_is_named_with_what_to_do(tmp_path: Path, name: str):
     plan = Plan("nothing", "synthetic", ("open",), 0)
-    place = play(tmp_path, plan) / file
-    place.write_bytes(place.read_bytes()[:10])
+    file = play(tmp_path, plan) / name
+    file.write_bytes(file.read_bytes()[:10])
     with pytest.raises(DamagedFile) as caught:
         play(tmp_path, plan)
-    assert str(caught.value).startswith(f"{place} is damaged (")
+    assert str(caught.value).startswith(f"{file} is damaged (")
     assert str(caught.value).endswith("; remove it and run again")
 
 
-RESULT = {
-    "method": "a",
-    "reaches": "real",
-    "seed": 0,
-    "splits": {"test": {"digest": "d", "scores": [1.0], "failed": 0, "causes": {"slipped": 1}, "closing_lag": 0.04}},
-}
-
-
-NO_RESULTS = [{}, [], RESULT | {"splits": []}, RESULT | {"splits": {"test": {}}}]
-NO_RESULTS.append(
-    RESULT
-    | {"splits": {"test": {"digest": "d", "scores": ["a"], "failed": 0, "causes": {"slipped": 1}, "closing_lag": 0.04}}}
-)
-
-
-@pytest.mark.parametrize("text", ["", "{", *map(json.dumps, NO_RESULTS)])
-def test_a_damaged_result_is_named(tmp_path: Path, text: str):
-    place = tmp_path / "a" / "real" / "seed0" / "result.json"
-    place.parent.mkdir(parents=True)
-    place.write_text(json.dumps(RESULT))
-    assert list(result_files.results(tmp_path)) == [RESULT]
-    place.write_text(text)
-    with pytest.raises(DamagedFile, match=r"result\.json is damaged"):
-        list(result_files.results(tmp_path))
-
-
-def test_progress_is_told_in_order(tmp_path: Path):
-    told = []
-    execution.execute(
-        resolve(Plan("nothing", "synthetic", ("test", "open"), 0)),
-        tmp_path,
-        1,
-        lambda done, total, note="": told.append((done, total)),
-    )
-    assert told == [(1, 2), (2, 2), (1, 1)]
+def test_progress_counts_the_episodes_of_each_split(tmp_path: Path):
+    reports = []
+    run = resolve(Plan("nothing", "synthetic", ("test", "open"), 0))
+    execution.execute(run, tmp_path, 1, lambda done, total, note="": reports.append((done, total)))
+    assert reports == [(1, 2), (2, 2), (1, 1)]
     assert not [file for file in os.listdir(tmp_path / "nothing" / "synthetic" / "seed0") if file.endswith(".part")]
+
+
+@pytest.mark.parametrize(
+    ("spec", "settings"),
+    [("tests.helpers.toy_learner:Toy", {"preset": "quick"}), ("tests.helpers.toy_learner:ToyTransfer", {})],
+)
+def test_a_run_creates_its_method_once(
+    spec: str, settings: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """`resolve` creates the method; training, evaluation and the result use this object."""
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    created, create = [], registry.create
+    monkeypatch.setattr(registry, "create", lambda *args: created.append(args[0]) or create(*args))
+    execution.execute(resolve(Plan(spec, "synthetic", ("test",), settings=settings)), tmp_path / "runs", threads=1)
+    assert created == [spec]
+
+
+def test_a_run_constructs_its_method_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    constructed, construct = [], floors.Nothing.__init__
+    monkeypatch.setattr(floors.Nothing, "__init__", lambda self: constructed.append(self) or construct(self))
+    execution.execute(resolve(Plan("nothing", "synthetic", ("test", "open"), record=1)), tmp_path, threads=1)
+    assert len(constructed) == 1

@@ -1,4 +1,4 @@
-"""Episodes to look at: the right ones are picked, in the right order, and wishes that cannot be say what could."""
+"""Filters select the right episodes in the right order, and name the valid values if a value is unknown."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ TABLE = pd.DataFrame(
 
 
 @pytest.mark.parametrize(
-    ("wish", "picked", "matching"),
+    ("settings", "rows", "passing"),
     [
-        ({}, [0, 1, 2, 3, 4], 6),  # An episode without a step cannot be looked at.
+        ({}, [0, 1, 2, 3, 4], 6),  # An episode without a step cannot be viewed.
         ({"worst": 3}, [2, 3, 1], 6),  # Equal returns in the order of the tables.
         ({"best": 3}, [0, 6, 1], 6),
         ({"worst": 1, "best": 1}, [2, 0], 6),
-        ({"worst": 4, "best": 4}, [2, 3, 1, 4, 0, 6], 6),  # Each once.
+        ({"worst": 4, "best": 4}, [2, 3, 1, 4, 0, 6], 6),  # Each episode appears once.
         ({"worst": 100}, [2, 3, 1, 4, 0, 6], 6),
         ({"failed": True}, [1, 2, 3, 4], 4),
         ({"failed": True, "best": 2}, [1, 4], 4),
@@ -44,13 +44,13 @@ TABLE = pd.DataFrame(
         ({"row": (0,), "split": ("test",)}, [0, 4, 6], 3),
     ],
 )
-def test_a_wish_picks_these_episodes(wish: dict[str, Any], picked: list[int], matching: int):
-    found, count = selection.select(TABLE, EpisodeFilter(**wish))
-    assert (found.index.tolist(), count) == (picked, matching)
+def test_a_filter_selects_these_episodes(settings: dict[str, Any], rows: list[int], passing: int):
+    selected, count = selection.select(TABLE, EpisodeFilter(**settings))
+    assert (selected.index.tolist(), count) == (rows, passing)
 
 
 @pytest.mark.parametrize(
-    ("wish", "told"),
+    ("settings", "message"),
     [
         ({"method": ("bc", "rlil")}, "no episode has method 'rlil'; choose from bc, rl"),
         ({"seed": (7,)}, "no episode has seed 7; choose from 0, 1"),
@@ -60,19 +60,19 @@ def test_a_wish_picks_these_episodes(wish: dict[str, Any], picked: list[int], ma
         ({"cause": ("agent failed",)}, "1 of 7 episodes pass the filter; the agent failed before their first step"),
     ],
 )
-def test_what_no_episode_has_is_told_with_what_there_is(wish: dict[str, Any], told: str):
+def test_an_unknown_value_is_answered_with_the_valid_ones(settings: dict[str, Any], message: str):
     with pytest.raises(NoEpisodes) as caught:
-        selection.select(TABLE, EpisodeFilter(**wish))
-    assert str(caught.value).startswith(told)
+        selection.select(TABLE, EpisodeFilter(**settings))
+    assert str(caught.value).startswith(message)
 
 
 @pytest.mark.parametrize("count", [0, -1])
-def test_fewer_than_one_episode_is_no_wish(count: int):
+def test_a_filter_for_fewer_than_one_episode_is_refused(count: int):
     with pytest.raises(BadFilter, match=f"--best {count}: select 1 episode or more"):
         EpisodeFilter(best=count)
 
 
-def test_recordings_are_found_at_files_and_below_folders_each_once(tmp_path: Path):
+def test_recordings_at_files_and_below_folders_are_listed_once(tmp_path: Path):
     files = [tmp_path / "a" / "recordings" / "test-0001.rrd", tmp_path / "a" / "recordings" / "test-0000.rrd"]
     files[0].parent.mkdir(parents=True)
     for file in files:
