@@ -13,7 +13,7 @@ import dextron_bench
 
 ROOT = Path(__file__).parents[1]
 LEVELS = {
-    "storage": 1,
+    "storage": 0,
     "reaches": 1,
     "world": 2,
     "experts": 3,

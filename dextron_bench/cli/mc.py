@@ -53,7 +53,7 @@ class MonteCarlo:
         with progress_bar("rows of return 20", self.quiet) as progress:
             draws = montecarlo.run(
                 source, search, folder, self.rows, engine,
-                lambda tally: progress(tally.solved, self.rows), montecarlo.Share.parse(self.share),
+                progress, montecarlo.Share.parse(self.share),
             )  # fmt: skip
         file, summary = database.save(draws, source, search, folder, f"experts-{self.reaches}")
         if self.json:

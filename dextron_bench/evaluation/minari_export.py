@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -19,6 +19,7 @@ from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import provenance
+from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import model, task
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ FORMAT = "arrow"  # The format of Minari that needs no further package.
 DATA = "data"  # Minari's name for the folder of the data, inside the data set's folder.
 NAME = re.compile(r"[\w-]+(/[\w-]+)*-v\d+", re.ASCII)
 CONTRIBUTORS = "the dextron-bench contributors"
-
-Report = Callable[[int, int], None]  # Receives (finished episodes, all episodes).
 
 
 class MissingMinari(ImportError):
@@ -76,7 +75,7 @@ class Export:
         if self.rows < 1 or not self.players:
             raise BadExport("a data set needs at least one row and one player")
 
-    def write(self, source: Source, into: Path, threads: int = 0, report: Report = lambda done, total: None) -> Path:
+    def write(self, source: Source, into: Path, threads: int = 0, progress: Progress = no_progress) -> Path:
         """Plays the episodes and stores them below the folder `into`; returns the data set's folder.
 
         Writes nothing else, and leaves nothing after an error. Raises MissingMinari, BadExport if the data set already
@@ -85,13 +84,13 @@ class Export:
         folder = into / self.name
         with _atomic_folder(folder) as part:
             storage = _create_storage(part / DATA, self.split.reaches)
-            metadata = dict(self._play(storage, source, threads, report))
+            metadata = dict(self._play(storage, source, threads, progress))
             storage.update_episode_metadata([metadata[number] for number in sorted(metadata)])
             storage.update_metadata(self._metadata())
         return folder
 
     def _play(
-        self, storage: MinariStorage, source: Source, threads: int, report: Report
+        self, storage: MinariStorage, source: Source, threads: int, progress: Progress
     ) -> Iterator[tuple[int, dict[str, Any]]]:
         """Plays and stores every episode; yields its number and its metadata."""
         cases = self.split.cases[: self.rows]
@@ -103,7 +102,7 @@ class Export:
                     number = place * len(cases) + row
                     storage.update_episodes([_buffer(number, episode)])
                     yield number, {"player": player.name, "row": row} | _episode_metadata(episode)
-                    report(place * len(cases) + done, len(self.players) * len(cases))
+                    progress(place * len(cases) + done, len(self.players) * len(cases))
 
     def _metadata(self) -> dict[str, Any]:
         """The data set's metadata: Minari's own keys, and everything that the episodes depend on."""

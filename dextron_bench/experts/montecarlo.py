@@ -7,7 +7,7 @@ continue, on any number of threads, and finds the same rows.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import pandas as pd
 from dextron_bench.experts import blocks, branching, policies
 from dextron_bench.reaches import setting
 from dextron_bench.storage import folder_config
+from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world.engine import Engine
 
 SLOTS = 1024  # Episodes at once, with the slots that are reserved for forks.
@@ -91,22 +92,23 @@ def run(
     folder: Path,
     rows: int,
     engine: Engine,
-    report: Callable[[blocks.Tally], None] = lambda tally: None,
+    progress: Progress = no_progress,
     share: Share | None = None,
 ) -> pd.DataFrame:
     """Searches, or continues, until `rows` rows have all 20 rewards; returns every draw with its outcome, in order.
 
     Columns: the columns of `draw`, then `score` (sum of rewards) and `length` [control steps]. Processes with different
-    shares may work in one folder. Raises FolderMismatch if the folder holds another search, DamagedBlock.
+    shares may work in one folder. Calls `progress` with the number of rows with all rewards, and `rows`. Raises
+    FolderMismatch if the folder holds another search, DamagedBlock.
     """
     blocks.write_or_check(asdict(search), folder)
     done = blocks.update_tallies(folder, {})
-    report(blocks.total(done))
+    progress(blocks.total(done).solved, rows)
     new_blocks = _play(source, search, engine, done, share or Share())
     while (last := blocks.last_block_needed(done, rows)) is None:
         blocks.write(folder, *next(new_blocks))
         done = blocks.update_tallies(folder, done)
-        report(blocks.total(done))
+        progress(blocks.total(done).solved, rows)
     return pd.concat([blocks.read(blocks.block_file(folder, number)) for number in range(last + 1)], ignore_index=True)
 
 

@@ -36,7 +36,7 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     assert main.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board"]) == 0
     assert "| `mine` |" in (tmp_path / "board" / "README.md").read_text()
     assert main.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board"]) == 2
-    assert "--replace puts this one in its place" in capsys.readouterr().err
+    assert "--replace replaces it" in capsys.readouterr().err
     assert main.main(["leaderboard", "add", "mine-synthetic.zip", "--board", "board", "--replace"]) == 0
     assert main.main(["leaderboard", "verify", "--all", "--board", "board"]) == 0
     assert "mine, synthetic reaches, seed 0: replayed, 4 of 4 episodes" in capsys.readouterr().out
@@ -127,7 +127,7 @@ def test_a_board_of_baselines_is_run_again(submitted: Path, tmp_path: Path, caps
     told["splits"]["test"]["scores"] += [20.0]
     file.write_text(json.dumps(told))
     assert main.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 2
-    assert "test has not one score and one hash of actions for each row" in capsys.readouterr().out
+    assert "test must have one score and one hash of actions for each row" in capsys.readouterr().out
     file.write_text(sound.replace("20.0", "19.0", 1))
     assert main.main(["leaderboard", "verify", "--all", "--board", str(board), "--method", "exp"]) == 1
     assert "says return 19; run again it is 20" in capsys.readouterr().out
@@ -146,7 +146,7 @@ def test_what_cannot_be_submitted_is_said(submitted: Path, capsys: pytest.Captur
         assert main.main(["submit", f"{submitted}/near.py:Near", *words]) == 2
         assert why in capsys.readouterr().err
     assert main.main(["leaderboard", "verify"]) == 2
-    assert "name a submission, or give --all" in capsys.readouterr().err
+    assert "give a submission, or --all" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["exp", "Exp", "rlil-0.3", "RLIL-0.1-mine", "exp\n", "first", "FIRST"])

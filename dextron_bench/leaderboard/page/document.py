@@ -26,7 +26,7 @@ DESCRIPTIONS = {
     "lines at their return on test.",
     "How episodes end": "Each episode has one cause. The closing lag is the time from the expert's closing to the "
     "method's; a negative lag means that the hand closed too early.",
-    "Success by person and start region": "Success in per cent, mean over seeds, by the person who reached and by the "
+    "Success by subject and start region": "Success in per cent, mean over seeds, by the subject who reached and by the "
     "start of the hand. Rings 0 to 3 go from near to far, angles 0 to 3 go around the bottle from -x to -y. "
     "A dash means that no setting starts there.",
     "Predictions of the success model": "Each curve is the predicted chance of success of every action; later steps "
@@ -47,7 +47,7 @@ def document(rows: pd.DataFrame, results: Iterable[dict[str, Any]], curves: Curv
     contents = {
         "Learning curves": sections.curves(curves, rows),
         "How episodes end": sections.endings(rows),
-        "Success by person and start region": sections.heatmaps(rows, results),
+        "Success by subject and start region": sections.heatmaps(rows, results),
         "Predictions of the success model": sections.ridges(recordings, shown),
         "Recordings": sections.recordings(shown),
     }

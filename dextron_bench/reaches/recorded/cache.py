@@ -9,9 +9,8 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-import tempfile
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +18,12 @@ import numpy as np
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import parsing, release
 from dextron_bench.reaches.recorded.release import Manifest
+from dextron_bench.storage.atomic import write_atomically
+from dextron_bench.storage.progress import Progress, no_progress
 
 CACHE_FILE = "real-reaches.npz"
 LAYOUT = "1"  # Version of the layout of the cache file; a file of another version counts as damaged.
 COLUMNS = ("names", "counts", "times", "positions", "quaternions", "reached")
-
-Progress = Callable[[int, int], None]
 
 
 class MissingData(LookupError):
@@ -55,7 +54,7 @@ def cache_file() -> Path:
     return cache_folder() / CACHE_FILE
 
 
-def import_release(location: Path, manifest: Manifest | None = None, progress: Progress | None = None) -> list[Reach]:
+def import_release(location: Path, manifest: Manifest | None = None, progress: Progress = no_progress) -> list[Reach]:
     """Reads and checks the release at `location`, stores it in the cache, and returns its reaches.
 
     Raises ReleaseError if a file differs from the published one, OSError if the cache cannot be written.
@@ -83,17 +82,12 @@ def load_reaches(manifest: Manifest | None = None) -> list[Reach]:
 def _write(file: Path, reaches: Sequence[Reach], manifest: Manifest) -> None:
     columns = _columns(reaches)
     digests = {"manifest": np.array(manifest.digest), "digest": np.array(_digest(columns, manifest))}
-    file.parent.mkdir(parents=True, exist_ok=True)
-    descriptor, temporary = tempfile.mkstemp(prefix=f".{file.stem}-", suffix=".npz", dir=file.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as stream:
+
+    def save(part: Path) -> None:
+        with part.open("wb") as stream:  # Given a path, savez would append a suffix to it.
             np.savez(stream, allow_pickle=False, **columns, **digests)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(temporary, file)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+
+    write_atomically(file, save)
 
 
 def _read(file: Path, manifest: Manifest) -> tuple[list[Reach] | None, str]:

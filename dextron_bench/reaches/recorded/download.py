@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import IO
 
 from dextron_bench.reaches.reach import Reach
-from dextron_bench.reaches.recorded.cache import Progress, import_release
+from dextron_bench.reaches.recorded.cache import import_release
 from dextron_bench.reaches.recorded.release import Manifest
+from dextron_bench.storage.progress import Progress, no_progress
 
 RELEASE = "https://github.com/sharif1093/dextron/archive/a101b9e7e4b1ba3875c36eb555543b2bb7a79818.zip"
 LIMIT = 1_000_000_000  # [bytes] well above the size of the whole repository with its meshes.
@@ -29,7 +30,7 @@ class FetchError(RuntimeError):
         )
 
 
-def fetch(manifest: Manifest | None = None, progress: Progress | None = None, url: str = RELEASE) -> list[Reach]:
+def fetch(manifest: Manifest | None = None, progress: Progress = no_progress, url: str = RELEASE) -> list[Reach]:
     """Downloads the release, imports it as `cache.import_release` does, and returns its reaches.
 
     Calls `progress` with the number of bytes so far, and the total or 0 if the server does not report it. Raises
@@ -42,7 +43,7 @@ def fetch(manifest: Manifest | None = None, progress: Progress | None = None, ur
         return import_release(file, manifest)
 
 
-def download(url: str, target: IO[bytes], limit: int = LIMIT, progress: Progress | None = None) -> None:
+def download(url: str, target: IO[bytes], limit: int = LIMIT, progress: Progress = no_progress) -> None:
     """Copies the content at `url` to `target`. Raises FetchError, also if it has more than `limit` bytes."""
     try:
         with urllib.request.urlopen(url, timeout=TIMEOUT) as response:
@@ -58,16 +59,13 @@ def download(url: str, target: IO[bytes], limit: int = LIMIT, progress: Progress
         raise FetchError(url, f"the connection broke ({error or type(error).__name__})") from error
 
 
-def _copy(
-    url: str, response: IO[bytes], target: IO[bytes], limit: int, expected: int, progress: Progress | None
-) -> None:
+def _copy(url: str, response: IO[bytes], target: IO[bytes], limit: int, expected: int, progress: Progress) -> None:
     done = 0
     while chunk := response.read(CHUNK):
         done += len(chunk)
         if done > limit or expected > limit:
             raise FetchError(url, f"it has more than {limit} bytes")
         target.write(chunk)
-        if progress:
-            progress(done, expected)
+        progress(done, expected)
     if done < expected:
         raise FetchError(url, f"the connection broke after {done} of {expected} bytes")

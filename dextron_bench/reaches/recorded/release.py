@@ -19,6 +19,7 @@ from pathlib import Path
 
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import parsing
+from dextron_bench.storage.progress import Progress, no_progress
 
 SHIPPED = Path(__file__).parents[2] / "data" / "real-manifest.json"
 MAX_FILE = 1_000_000  # [bytes] far above the largest recording (41 kB), and harmless in memory.
@@ -51,7 +52,7 @@ class Manifest:
         return sorted(Path(file).stem for file in self.files if "/meta/" not in file)
 
 
-def read(location: Path, manifest: Manifest, progress: Callable[[int, int], None] | None = None) -> list[Reach]:
+def read(location: Path, manifest: Manifest, progress: Progress = no_progress) -> list[Reach]:
     """All reaches of the release at `location`, sorted by name, after a check of each file against the manifest.
 
     Calls `progress` with the numbers of reaches read and in all. Raises ReleaseError, and FileNotFoundError if
@@ -68,8 +69,7 @@ def read(location: Path, manifest: Manifest, progress: Callable[[int, int], None
                 raise ReleaseError(str(error)) from error
             _verify_hashes(manifest, contents)
             reaches.append(reach)
-            if progress:
-                progress(len(reaches), len(names))
+            progress(len(reaches), len(names))
     return reaches
 
 

@@ -34,6 +34,7 @@ from dextron_bench.reaches.synthetic.two_sample_held_out import (
     held_out_subjects,
     no_tick,
 )
+from dextron_bench.storage.progress import Progress, no_progress
 
 TREES = 100
 LEAF = 3  # Fewest reaches in a leaf.
@@ -49,9 +50,7 @@ class MissingClassifiers(ImportError):
         super().__init__("the two-sample test needs scikit-learn: `pip install scikit-learn`")
 
 
-def study(
-    real: Sequence[Reach], seed: int, progress: Callable[[int, int], None] = lambda done, total: None
-) -> dict[str, pd.DataFrame]:
+def study(real: Sequence[Reach], seed: int, progress: Progress = no_progress) -> dict[str, pd.DataFrame]:
     """All tables of the two-sample test, by name.
 
     `nearest` is about the shipped reaches. All other tables are about models that were not fitted to the recorded
