@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,7 @@ def install(readable: Sequence[Path], scratch: Path) -> None:
     system = (*DEVICES, "/usr", "/lib", "/lib64", "/etc")
     allowed = [os.path.realpath(path) for path in (*python, *system, package, package.parent / "baselines", *readable)]
     secrets = [str(file) for file in sandbox.secret_files()]
+    sys.meta_path.insert(0, _HiddenModules())
     sys.addaudithook(_Guard(allowed, os.path.realpath(scratch), secrets))
 
 
@@ -77,6 +79,19 @@ def _is_hidden(module: str) -> bool:
     return top in SIMULATORS or (top == "dextron_bench" and module not in PUBLIC and not module.startswith(WORKER))
 
 
+def _check_import(module: str) -> None:
+    if _is_hidden(module):
+        raise NotForAgents(f"import {module}, which gives access to the simulator or the splits")
+
+
+class _HiddenModules(MetaPathFinder):
+    """Refuses hidden modules to `importlib.import_module`, which raises no audit event; raises NotForAgents."""
+
+    def find_spec(self, fullname: str, *_: object) -> None:
+        """Finds no module; raises if the module is hidden."""
+        _check_import(fullname)
+
+
 class _Guard:
     """The audit hook; raises NotForAgents."""
 
@@ -84,9 +99,9 @@ class _Guard:
         self._allowed, self._scratch, self._secrets = tuple(allowed), scratch, frozenset(secrets)
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
-        if event == "import" and _is_hidden(arguments[0]):
-            raise NotForAgents(f"import {arguments[0]}, which gives access to the simulator or the splits")
-        if event == "open":
+        if event == "import":
+            _check_import(arguments[0])
+        elif event == "open":
             self._check_open(*arguments)
         elif event in CHANGING:
             self._check_change(arguments, event)

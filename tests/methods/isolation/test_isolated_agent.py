@@ -108,6 +108,8 @@ def test_an_agent_may_import_the_public_names_of_policies(agent_spec: Callable[[
         ("from dextron_bench import rollout", "agents may not import dextron_bench.evaluation"),
         ("import dextron_bench; dextron_bench.load_split", "agents may not import dextron_bench.splits"),
         ("import mujoco", "agents may not import mujoco"),
+        ("import importlib; importlib.import_module('mujoco')", "agents may not import mujoco,"),
+        ("from dextron_bench import Setting", "agents may not import dextron_bench.reaches.setting"),
         ("from dextron_bench.world import model; model.load()", "'NoneType' object is not callable"),
         ("import dextron_bench as d; open(d.__path__[0] + '/data/splits.json')", "settings and experts are not for"),
         ("open('/etc/../root/.bashrc')", "may read only Python's files and their own folder"),
