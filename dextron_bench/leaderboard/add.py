@@ -17,7 +17,7 @@ from dextron_bench.storage.run_folder import RunFolder
 
 
 def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:
-    """Raises BadSubmission if the submission may not write a row of that name."""
+    """Raises BadSubmission if a submission must not use a name, or if it is on the board and `replace` is False."""
     if not registry.NAME.fullmatch(name):
         raise BadSubmission(f"{name!r} is not a valid name: use letters, digits and . _ + -, as in 'my-agent'")
     results = board / collect.RESULTS
@@ -27,7 +27,7 @@ def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:
     if taken or name.casefold().split("-")[0] in registry.installed_methods():
         raise BadSubmission(f"{name!r} equals or begins like the name of another row; submit it under another name")
     if place and (place / reaches).exists() and not replace:
-        raise BadSubmission(f"{name!r} on {reaches} reaches is on the board; --replace puts this one in its place")
+        raise BadSubmission(f"{name!r} on {reaches} reaches is on the board; --replace replaces it")
 
 
 def merge(verdict: Verdict, board: Path) -> list[Path]:
@@ -46,6 +46,7 @@ def merge(verdict: Verdict, board: Path) -> list[Path]:
 
 
 def _put(verdict: Verdict, board: Path) -> None:
+    """Writes the results, tables and manifest of a submission into the results of a board."""
     manifest = verdict.manifest
     place = board / collect.RESULTS / manifest["name"] / manifest["reaches"]
     part = place.with_name(f".{place.name}.part")

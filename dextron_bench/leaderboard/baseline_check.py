@@ -27,7 +27,7 @@ class NotReproducible(LookupError):
 
 @dataclass(slots=True)
 class Finding:
-    """What verification finds for a row: what was done, and problems, none if its episodes give what it says.
+    """What verification finds for a row: what was done, and the problems; none if the row is reproduced.
 
     `actions` are hashes of the actions on every split, if a baseline ran again on all rows.
     """
@@ -58,11 +58,11 @@ def rerun(run: RunFolder, result: dict[str, Any], count: int, threads: int, repo
 
 
 def _fault(claimed: dict[str, Any], split: Split) -> str:
-    """What is wrong with the form of a split's scores; empty if they can be compared."""
+    """Why a split's scores cannot be compared with the split; empty if they can."""
     if split.digest != claimed["digest"]:
         return f"{split.name} is of another version of the split"
     if {len(claimed[name]) for name in ("scores", "actions") if name in claimed} != {len(split.cases)}:
-        return f"{split.name} has not one score and one hash of actions for each row of the split"
+        return f"{split.name} must have one score and one hash of actions for each row of the split"
     return ""
 
 
@@ -89,7 +89,7 @@ def _differences(claimed: dict[str, Any], computed: dict[str, Any], rows: np.nda
         if claimed["scores"][row] != computed["scores"][place]:
             yield f"row {row}: says return {claimed['scores'][row]:g}; run again it is {computed['scores'][place]:g}"
         elif "actions" in claimed and claimed["actions"][row] != computed["actions"][place]:
-            yield f"row {row}: says other actions than those of the agent, run again"
+            yield f"row {row}: says other actions than the agent, run again, chose"
     for name in ("failed", "causes", "closing_lag") if whole else ():
         if claimed[name] != computed[name]:
             yield f"says {name.replace('_', ' ')} {claimed[name]}; run again it is {computed[name]}"
@@ -107,14 +107,14 @@ def _agent(run: RunFolder, result: dict[str, Any]) -> Agent:
     maker, seed = result.get("maker", {}), result["seed"]
     if maker.get("method") not in registry.installed_methods():
         raise NotReproducible("has neither its episodes nor a method that ships")
-    made = resolve(Plan(maker["method"], result["reaches"], seed=seed, settings=maker["settings"]))
+    shipped = resolve(Plan(maker["method"], result["reaches"], seed=seed, settings=maker["settings"]))
     claimed = RunFolder.of(run.path.parents[2], result["method"], result["reaches"], seed)
-    if run.identity != claimed.identity or (result["method"], result["reaches"]) != (made.label, made.source):
-        raise NotReproducible(f"lies in {run.identity}, but was made by {made.label} on {made.source} reaches")
-    if made.learner is not None:
-        made = with_shipped_weights(made, [seed])[0]
-        assert made.plan.weights
-        facts = weights.metadata(made.plan.weights)
-        if other := [name for name in ("sha256", *facts) if result["training"].get(name) != facts[name]]:
-            raise NotReproducible(f"was made with other weights than those that ship: its {other[0]} differs")
-    return execution.agent(made, made.plan.weights)
+    if run.identity != claimed.identity or (result["method"], result["reaches"]) != (shipped.label, shipped.source):
+        raise NotReproducible(f"lies in {run.identity}, but was made by {shipped.label} on {shipped.source} reaches")
+    if shipped.learner is not None:
+        shipped = with_shipped_weights(shipped, [seed])[0]
+        assert shipped.plan.weights
+        facts = weights.metadata(shipped.plan.weights)
+        if differing := [name for name in ("sha256", *facts) if result["training"].get(name) != facts[name]]:
+            raise NotReproducible(f"was made with other weights than those that ship: its {differing[0]} differs")
+    return execution.agent(shipped, shipped.plan.weights)

@@ -23,7 +23,8 @@ Curves = dict[int, pd.DataFrame]  # By seed; columns epoch, return, success.
 def build(board: Path) -> list[Path]:
     """Writes table (CSV, JSON), README tables, pictures of learning curves and page into a leaderboard's folder.
 
-    The page links to recordings in the folder beside. Returns the files; raises DamagedFile, BrokenRecording.
+    The page links to the recordings in the folder beside the leaderboard's. Returns the files; raises DamagedFile,
+    BrokenRecording.
     """
     from dextron_bench.leaderboard import page
     from dextron_bench.leaderboard.highlights import FOLDER
@@ -49,11 +50,11 @@ def build(board: Path) -> list[Path]:
 
 
 def _with_origin(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.DataFrame:
-    """The leaderboard's rows with the columns ORIGIN: how far each was checked, and what making it took."""
+    """The leaderboard's rows with the columns ORIGIN: how far each row was checked, and what its training took."""
     from dextron_bench.leaderboard.page.rows import QUOTED, entries
 
-    own_entries = [entry for entry in entries(rows, results) if entry.tier != QUOTED]
-    return rows.assign(**{name: [getattr(entry, name) for entry in own_entries] for name in ORIGIN})
+    ranked_entries = [entry for entry in entries(rows, results) if entry.tier != QUOTED]
+    return rows.assign(**{name: [getattr(entry, name) for entry in ranked_entries] for name in ORIGIN})
 
 
 def learning_curves(runs: Path, cloned: bool = False) -> dict[tuple[str, str], Curves]:

@@ -101,12 +101,12 @@ def _replay(row: Row, threads: int, report: Progress) -> Finding:
     if problem := _misplaced(row, [f"seed{seed}" for seed in manifest.get("seeds", [])]):
         return Finding("", [problem])
     if result_files.scores_by_split(replayed.rows) != row.result["splits"]:
-        return Finding("", ["its result is not what its actions, played again, give", *replayed.differing[:5]])
+        return Finding("", ["its result differs from its actions, played again", *replayed.differing[:5]])
     return Finding(f"replayed, {replayed.exact} of {replayed.episodes} episodes equal bit for bit")
 
 
 def _misplaced(row: Row, seeds: Sequence[str]) -> str:
-    """What is wrong with the place of a submission's row; empty if it lies among exactly the seeds of its manifest."""
+    """Why a submission's row is in the wrong folder or among wrong seeds; empty if folder and seeds are right."""
     claimed = "/".join((row.result["method"], row.result["reaches"], f"seed{row.result['seed']}"))
     if row.run.identity != claimed:
         return f"lies in {row.run.identity}, but is of {row.name}"

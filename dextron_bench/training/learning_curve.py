@@ -1,6 +1,6 @@
-"""The learning curve: how snapshots of a training score on `val`, and which of them is the best.
+"""The learning curve: the scores of a training's snapshots on `val`, and the best snapshot.
 
-A score is a pure function of a snapshot's file, and is stored beside it.
+A score depends only on the snapshot's file and on `val`, and is stored beside the file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.world import task
 
 POINT_ROWS = 50  # Rows of `val` that make a point of the curve.
-FINALISTS = 5  # Snapshots with the best points; all of `val` decides between them.
+FINALISTS = 5  # Snapshots with the best points; their scores on all of `val` decide between them.
 
 
 class Curve:
@@ -30,7 +30,7 @@ class Curve:
     ) -> None:
         self._learner, self._checkpoints, self._source, self._val = learner, checkpoints, source, val
         self._threads = threads
-        self._known: dict[Path, list[float]] = {}  # Scores by their file, read or played by this object.
+        self._cache: dict[Path, list[float]] = {}  # Scores by file, once read or played.
 
     def score_snapshots(self) -> None:
         """Plays the episodes of every point that is not scored yet."""
@@ -53,7 +53,7 @@ class Curve:
         return points
 
     def best(self, seed: int) -> int:
-        """The epoch of the snapshot with the highest mean on all of `val`; of equal ones the later."""
+        """The epoch of the finalist with the highest mean on all of `val`; the latest if several are equal."""
         ranked = sorted((mean(self._scores(epoch, seed, POINT_ROWS)), epoch) for epoch in self._checkpoints.epochs())
         rows = len(self._val.cases)
         finals = [(mean(self._scores(epoch, seed, rows)), epoch) for _, epoch in ranked[-FINALISTS:]]
@@ -64,9 +64,9 @@ class Curve:
         rows = min(rows, len(self._val.cases))
         snapshot = self._checkpoints.snapshot(epoch, seed)
         file = snapshot.with_name(f"{snapshot.stem}-val{rows}.json")
-        if file not in self._known:
-            self._known[file] = self._stored(file) or self._play_and_store(snapshot, file, rows)
-        return self._known[file]
+        if file not in self._cache:
+            self._cache[file] = self._stored(file) or self._play_and_store(snapshot, file, rows)
+        return self._cache[file]
 
     def _stored(self, file: Path) -> list[float]:
         """The scores in a file; empty if there are none on this version of `val`."""

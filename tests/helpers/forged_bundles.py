@@ -1,4 +1,4 @@
-"""Submissions to a tiny benchmark, taken apart and put together again with hashes that are right."""
+"""Submissions to a tiny benchmark, and forgeries of them: changed bundles with correct hashes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ ROWS = pd.concat(
 
 @dataclass
 class Forgery:
-    """A submission taken apart, to be changed and put together again with hashes that are right."""
+    """An unpacked submission, to be changed and packed again with correct hashes."""
 
     folder: Path
     board: Path
@@ -71,27 +71,27 @@ class Forgery:
         (self.folder / name).write_text(json.dumps(value))
 
     def conclude(self) -> None:
-        """Makes the result that of the changed episodes."""
-        told = pd.read_parquet(RunFolder(self.seed).episodes)
-        self.json("seed0/result.json", lambda result: result.update(splits=result_files.scores_by_split(told)))
+        """Computes the result of the changed episodes."""
+        table = pd.read_parquet(RunFolder(self.seed).episodes)
+        self.json("seed0/result.json", lambda result: result.update(splits=result_files.scores_by_split(table)))
 
-    def checked(self, **how: Any) -> Verdict:
-        """What verification finds after all hashes were made right."""
+    def checked(self, **options: Any) -> Verdict:
+        """Packs the bundle with correct hashes, and verifies it."""
         manifest = json.loads((self.folder / bundle.MANIFEST).read_text())
-        names = {str(each.relative_to(self.folder)): each for each in self.folder.rglob("*") if each.is_file()}
-        hashes = {name: hashing.sha256(each) for name, each in names.items() if name != bundle.MANIFEST}
-        file = self.folder.with_suffix(".zip")
-        with zipfile.ZipFile(file, "w") as archive:
+        files = {str(path.relative_to(self.folder)): path for path in self.folder.rglob("*") if path.is_file()}
+        hashes = {name: hashing.sha256(path) for name, path in files.items() if name != bundle.MANIFEST}
+        packed = self.folder.with_suffix(".zip")
+        with zipfile.ZipFile(packed, "w") as archive:
             archive.writestr(bundle.MANIFEST, json.dumps(manifest | {"files": hashes}))
             for name in hashes:
-                archive.write(names[name], name)
+                archive.write(files[name], name)
         into = self.folder.with_name("again")
         shutil.rmtree(into, ignore_errors=True)
-        return verification.verify(into, bundle.unpack(file, into), self.board, threads=1, **how)
+        return verification.verify(into, bundle.unpack(packed, into), self.board, threads=1, **options)
 
 
 def submitted(here: Path) -> Iterator[Path]:
-    """A folder with a sound bundle of two seeds on a tiny benchmark, which is there until the end."""
+    """A folder with a valid bundle of two seeds on a tiny benchmark; the benchmark stays until the generator ends."""
     try:
         with pytest.MonkeyPatch.context() as patch:
             tiny_benchmark.write(here / "splits", ROWS)
@@ -106,7 +106,7 @@ def submitted(here: Path) -> Iterator[Path]:
 
 
 def taken_apart(file: Path, here: Path) -> Forgery:
-    """The bundle of a file, to be changed."""
+    """Unpacks a bundle, so that a test can change it."""
     folder = here / "forged"
     bundle.unpack(file, folder)
     with zipfile.ZipFile(file) as archive:
@@ -118,9 +118,9 @@ def row(number: int, **changes: Any) -> Callable[[pd.DataFrame], pd.DataFrame]:
     """Changes one row of `test`."""
 
     def change(table: pd.DataFrame) -> pd.DataFrame:
-        here = (table["split"] == "test") & (table["row"] == number)
+        selected = (table["split"] == "test") & (table["row"] == number)
         for name, value in changes.items():
-            table[name] = [value if found else old for found, old in zip(here, table[name], strict=True)]
+            table[name] = [value if is_row else old for is_row, old in zip(selected, table[name], strict=True)]
         return table
 
     return change

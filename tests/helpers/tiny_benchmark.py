@@ -1,4 +1,4 @@
-"""A benchmark of a few short made-up reaches in place of the shipped one, in this process or in one of its own."""
+"""A benchmark of a few short artificial reaches that replaces the shipped one, in this process or in a new one."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from dextron_bench.splits import loading
 from dextron_bench.splits.loading import _catalogue, _table, split_digest
 from tests.helpers.short_reaches import SOURCE
 
-NAME = "synthetic"  # What the source is called, since the command line knows it.
+NAME = "synthetic"  # The name of the source; the command line accepts it.
 COLUMNS = ["split", "reach", "offset_x", "offset_y", "duration_noise", "gain", "critical", "window"]
-SOLVED = (  # Found by a search; each expert scores 20.
+SOLVED = (  # From a search; each expert scores 20.
     ("b", -0.0432621503294626, -0.01466825592348343, 0.4574125439673816, 1.4146469215542943, 0.16870179317709627, 0.1),
     ("a", -0.0256286214908538, -0.0306174763715841, 1.5043816401333401, 1.4684286438473184, 0.2672967412483991, 0.1),
 )
@@ -41,7 +41,7 @@ sys.exit(main())
 
 
 def write(folder: Path, rows: pd.DataFrame = ROWS) -> Path:
-    """Writes splits as they ship, catalogue and table, into a folder."""
+    """Writes the catalogue and the table of the splits into a folder; returns the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     rows.to_parquet(folder / f"splits-{NAME}.parquet")
     groups = rows.groupby("split", sort=False)
@@ -51,21 +51,21 @@ def write(folder: Path, rows: pd.DataFrame = ROWS) -> Path:
 
 
 def install(folder: Path, put: Callable[[object, str, object], None] = setattr) -> None:
-    """Makes the splits in a folder the shipped ones, and the made-up reaches their source."""
+    """Replaces the shipped splits and their source; `put` sets attributes, as `setattr` does."""
     put(loading, "files", lambda package: folder)
     put(sources, "SOURCES", {**sources.SOURCES, NAME: lambda: SOURCE})
     forget()
 
 
 def forget() -> None:
-    """Makes splits be read again."""
+    """Clears the caches, so that splits are read again."""
     _catalogue.cache_clear()
     _table.cache_clear()
 
 
-def start(folder: Path, *words: str | Path, **environment: str) -> subprocess.Popen[str]:
-    """Starts the command line on the splits in a folder."""
-    command = [sys.executable, "-c", COMMAND, str(Path(__file__).parents[2]), str(folder), *map(str, words)]
+def start(folder: Path, *arguments: str | Path, **environment: str) -> subprocess.Popen[str]:
+    """Starts the command line with the splits in a folder, in a new process."""
+    command = [sys.executable, "-c", COMMAND, str(Path(__file__).parents[2]), str(folder), *map(str, arguments)]
     inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
     return subprocess.Popen(
         command, env={**inherited, **environment}, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
