@@ -6,7 +6,7 @@ import numpy as np
 
 CLIP = 10.0  # Scaled states and rewards are clipped to [-CLIP, CLIP].
 EPSILON = 1e-8
-PRIOR = 1e-4  # The initial mean 0 and variance 1 count as so many observations.
+PRIOR = 1e-4  # Weight of the initial mean 0 and variance 1, as a number of observations.
 
 
 class Moments:

@@ -2,8 +2,8 @@
 
 The rounding of a sum of floats depends on the order of its terms, and a matrix product chooses this order by shape and
 processor. `Perceptron` first rounds both factors to integer multiples of a power of two. The integers have so few bits
-that float64 holds every product and every sum exactly, so the order no longer matters. The precision is about that
-of float32.
+that float64 holds every product and every sum exactly, so the order no longer matters. The precision is close
+to float32.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ class Learner(Protocol):
 
     @property
     def period(self) -> int:
-        """Every so many epochs, the harness saves a checkpoint and adds a point to the learning curve."""
+        """Number of epochs between checkpoints; the harness scores each checkpoint for the learning curve."""
         ...
 
     @property

@@ -56,7 +56,7 @@ class IsolatedAgent:
         self._scratch.cleanup()
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Notes that rows `episodes` begin a new episode; the next question tells the agent."""
+        """Notes that rows `episodes` begin a new episode; the next request passes this to the agent."""
         self._begun += episodes.tolist()
 
     def act(self, states: np.ndarray) -> np.ndarray:

@@ -48,7 +48,7 @@ class Process:
         threading.Thread(target=self._read, args=(self._popen.stdout,), daemon=True).start()
 
     def ask(self, question: bytes, seconds: float) -> bytes:
-        """The line that answers a question; raises NoAnswer, at the latest after so many seconds."""
+        """The line that answers a question; raises NoAnswer if the process ends or no line comes in time."""
         if not self._answers.empty():
             surplus = self._answers.get()
             raise NoAnswer(f"it wrote {len(surplus)} bytes that nobody asked for" if surplus else "it ended")
