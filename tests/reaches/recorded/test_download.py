@@ -43,13 +43,15 @@ def server_url(small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_fetch_imports_the_downloaded_release(small_release: SmallRelease, server_url: str):
-    progress: list[tuple[int, int]] = []
+    reports: list[tuple[int, int]] = []
+
+    def progress(done: int, total: int, note: str = "") -> None:
+        reports.append((done, total))
+
     manifest = release.Manifest.load(small_release.manifest)
-    reaches = download.fetch(
-        manifest, lambda done, total: progress.append((done, total)), url=f"{server_url}/release.zip"
-    )
+    reaches = download.fetch(manifest, progress, url=f"{server_url}/release.zip")
     assert len(reaches) == 3 == len(cache.load_reaches(manifest))
-    assert progress[-1] == (len(Server.content), len(Server.content))
+    assert reports[-1] == (len(Server.content), len(Server.content))
 
 
 @pytest.mark.parametrize(("page", "reason"), [("none", "the server answers 404"), ("cut", "the connection broke")])
