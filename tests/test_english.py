@@ -19,10 +19,6 @@ DOCUMENTS = (
     *("dextron_bench/**/*.html", "dextron_bench/**/*.js"),
 )
 TO_DO: tuple[str, ...] = (  # Folders and files that are not rewritten yet.
-    "dextron_bench/leaderboard/submission",
-    "dextron_bench/methods",
-    "dextron_bench/runs",
-    "docs",
     "tests/leaderboard",
     "tests/shipped",
 )

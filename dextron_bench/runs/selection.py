@@ -27,7 +27,7 @@ class BadFilter(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class EpisodeFilter:
-    """Which episodes of which runs to select; an empty entry, and False, select all. Raises BadFilter.
+    """Selects episodes by run, split and outcome; an empty entry, and False, select all. Raises BadFilter.
 
     `worst` and `best` are numbers of episodes with the lowest and the highest returns; without either, the first LIMIT
     episodes are selected.

@@ -56,7 +56,7 @@ class SeedCheck:
         return finding
 
     def rerun(self, limits: Limits, threads: int, report: Progress) -> SeedFinding:
-        """Runs the agent again and compares its episodes with those of the replay."""
+        """Runs the agent again and compares its episodes with the replayed ones."""
         finding, differing = SeedFinding(self._seed), []
         source = sources.open_source(self._manifest["reaches"])
         total, done = sum(len(split.cases) for split in self._splits), 0
