@@ -31,8 +31,8 @@ class Track:
 
     `source` gives the reaches, and `cases` are the rows of `train`: settings with their experts. `cache` is a folder
     for files that can be made again, such as demonstrations; several learners may share it. `threads` is the number of
-    threads of the simulation (0: one per processor), `device` the PyTorch device of the networks. Neither may change a
-    result.
+    threads of the simulation (0: one per processor); results must not depend on it. `device` is the PyTorch device of
+    the networks.
     """
 
     source: Source
@@ -43,7 +43,7 @@ class Track:
 
 
 class Trainer(Protocol):
-    """Trains one agent for each of S seeds, all S together.
+    """Trains one agent for each of S seeds, all S together; lists have one element per seed, in the order of the seeds.
 
     Resuming must be exact to the bit: a new trainer that receives another trainer's `state` and all its `journal`s in
     `restore` must continue as the other would have. The harness calls every method below `advance` between epochs only.
@@ -52,7 +52,7 @@ class Trainer(Protocol):
     epoch: int  # Number of finished epochs.
 
     def advance(self) -> list[dict[str, float]]:
-        """Trains for one epoch; returns the epoch's metrics, one dict per seed.
+        """Trains for one epoch; returns the epoch's metrics for each seed.
 
         Values are finite; leave out a metric that is not known. `frames` is the total number of control steps that
         the agent has acted in so far.
@@ -60,7 +60,7 @@ class Trainer(Protocol):
         ...
 
     def weights(self) -> list[Arrays]:
-        """Copies of the arrays that `Learner.policy` needs to act as the agents act now, one dict per seed."""
+        """Copies of the arrays that `Learner.policy` needs to act as the agents act now, for each seed."""
         ...
 
     def state(self) -> Arrays:
