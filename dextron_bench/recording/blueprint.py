@@ -1,4 +1,4 @@
-"""The layout of a recording in the viewer: plots, text card, and how the views are arranged."""
+"""The layout of a recording in the viewer: plots, text, and how the views are arranged."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ PLOTS_WITH_PREDICTIONS = {  # The same for recordings with predictions of the su
     METRES: PLOTS[METRES],
     "Reward (yellow), predicted success (blue)": (("/episode/rewards", "/success/chance"), (-0.1, 1.1)),
 }
-HASH_LENGTH = 64  # Characters of a SHA-256; the card shows the first eight.
+HASH_LENGTH = 64  # Characters of a SHA-256; the text shows the first eight.
 BACKGROUND = (33, 38, 45)
 
 
@@ -80,7 +80,7 @@ def outcome(episode: Episode) -> str:
     return "success" if episode.success else "held too briefly" if episode.score else "not lifted"
 
 
-def text_card(episode: Episode, properties: Mapping[str, object]) -> Chunk:
+def text_document(episode: Episode, properties: Mapping[str, object]) -> Chunk:
     """A table of outcome, properties and setting as text, which the viewer shows beside the plots."""
     entries = {
         **properties,
@@ -105,7 +105,7 @@ def _cell(value: object) -> str:
 
 @cache
 def blueprint(with_predictions: bool = False, live: bool = False) -> rrb.Blueprint:
-    """Layout with the 3D view on the left, and text card and plots on the right.
+    """Layout with the 3D view on the left, and text and plots on the right.
 
     With predictions it also has the success curve and the ridge plot. With `live` the viewer follows the newest step.
     """
@@ -118,10 +118,10 @@ def blueprint(with_predictions: bool = False, live: bool = False) -> rrb.Bluepri
         content = rrb.Horizontal(first_column, column, _ridge(), column_shares=[9, 7, 4])
     else:
         content = rrb.Horizontal(spatial_view(), column, column_shares=[3, 2])
-    return page(content, live)
+    return with_time_panel(content, live)
 
 
-def page(content: rrb.Container, live: bool = False) -> rrb.Blueprint:
+def with_time_panel(content: rrb.Container, live: bool = False) -> rrb.Blueprint:
     """A layout of the content with the time panel below it; all other panels are hidden."""
     return rrb.Blueprint(
         content,

@@ -106,7 +106,7 @@ def _static_chunks() -> tuple[list[Chunk], list[str]]:
 
 
 def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk]:
-    """Arrays and properties of the episode, its text card, and the signals that are plotted."""
+    """Arrays and properties of the episode, its text, and the signals that are plotted."""
     steps = len(episode.actions)
     shapes = (steps + 1, model.STATE), (steps, 1), (steps,)
     for name, shape, first in zip(ARRAYS, shapes, (0, 0, 1), strict=True):
@@ -120,7 +120,7 @@ def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk
     yield Chunk.from_property("episode", rr.AnyValues(**_values(episode_properties)))
     if properties:
         yield Chunk.from_property("run", rr.AnyValues(**_values(properties)))
-    yield blueprint.text_card(episode, properties)
+    yield blueprint.text_document(episode, properties)
     yield from blueprint.signals(episode.states)
 
 

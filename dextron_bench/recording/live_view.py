@@ -25,7 +25,7 @@ class LiveView:
     """One episode in the viewer, step by step: an `Observer` of `dextron_bench.success.live`."""
 
     def __init__(self, connect: Connect, name: str, path: reach.Path, about: Mapping[str, object]) -> None:
-        """Shows the scene and the palm's path, and a card with the entries of `about`."""
+        """Shows the scene and the palm's path, and a text with the entries of `about`."""
         rr.set_strict_mode(True)
         self._stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)
         connect(self._stream)

@@ -88,4 +88,4 @@ def _blueprint(names: list[str]) -> rrb.Blueprint:
         )
         for title, (entities, span) in PLOTS.items()
     ]
-    return blueprint.page(rrb.Horizontal(*columns, rrb.Vertical(*plots), column_shares=[4, 4, 5]))
+    return blueprint.with_time_panel(rrb.Horizontal(*columns, rrb.Vertical(*plots), column_shares=[4, 4, 5]))

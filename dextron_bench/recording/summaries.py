@@ -93,10 +93,10 @@ def _format_fault(file: Path) -> str:
     if not file.is_file():
         return "is no file" if file.exists() else "there is no such file"
     try:
-        with file.open("rb") as opened:
-            head = opened.read(HEAD)
-            opened.seek(-min(len(head), 8), os.SEEK_END)
-            tail = opened.read()
+        with file.open("rb") as stream:
+            head = stream.read(HEAD)
+            stream.seek(-min(len(head), 8), os.SEEK_END)
+            tail = stream.read()
     except OSError as error:
         return f"cannot be read ({error.strerror})"
     if not head:

@@ -32,14 +32,14 @@ def view(files: Sequence[Path]) -> None:
     Raises ViewerError, and FileNotFoundError if a recording does not exist.
     """
     _require(files)
-    with viewer_process(["--port", "auto", *map(str, files)]) as opened:
-        wait(opened)
+    with viewer_process(["--port", "auto", *map(str, files)]) as process:
+        wait(process)
 
 
-def wait(opened: subprocess.Popen[bytes]) -> None:
+def wait(process: subprocess.Popen[bytes]) -> None:
     """Waits until the user closes a viewer; raises ViewerError if it ends with an error."""
-    if opened.wait():
-        raise ViewerError(f"Rerun's viewer ended with code {opened.returncode}; does this machine have a screen?")
+    if process.wait():
+        raise ViewerError(f"Rerun's viewer ended with code {process.returncode}; does this machine have a screen?")
 
 
 def screenshots(file: Path, pictures: Mapping[int, Path], width: int = 1600, height: int = 900) -> None:
@@ -50,9 +50,9 @@ def screenshots(file: Path, pictures: Mapping[int, Path], width: int = 1600, hei
     _require([file])
     port = free_port()
     window = ["--headless", "--window-size", f"{width}x{height}", "--hide-welcome-screen", "--port", str(port)]
-    with TemporaryFile() as logs, viewer_process(window, logs) as opened:
+    with TemporaryFile() as logs, viewer_process(window, logs) as process:
         try:
-            client = ViewerClient.connect(address(port, opened))
+            client = ViewerClient.connect(address(port, process))
             client.open(str(file.resolve()))
             time.sleep(NOTICE_TIME)
             for step, picture in pictures.items():
@@ -77,19 +77,19 @@ def viewer_process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> I
     """Runs a viewer process; the end of the block ends it and its children."""
     command = [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *arguments]
     environment = {"WGPU_BACKEND": "vulkan", **os.environ} if logs else None
-    opened = subprocess.Popen(command, env=environment, stdout=logs, stderr=logs, start_new_session=True)
+    process = subprocess.Popen(command, env=environment, stdout=logs, stderr=logs, start_new_session=True)
     try:
-        yield opened
+        yield process
     finally:
         with suppress(ProcessLookupError):
-            os.killpg(opened.pid, signal.SIGTERM)
-        opened.wait()
+            os.killpg(process.pid, signal.SIGTERM)
+        process.wait()
 
 
-def address(port: int, opened: subprocess.Popen[bytes]) -> str:
+def address(port: int, process: subprocess.Popen[bytes]) -> str:
     """The address of a viewer, as soon as it accepts connections; raises ViewerError if it does not start."""
     deadline = time.monotonic() + START_TIMEOUT
-    while time.monotonic() < deadline and opened.poll() is None:
+    while time.monotonic() < deadline and process.poll() is None:
         try:
             socket.create_connection((LOOPBACK, port), timeout=1).close()
         except OSError:

@@ -23,8 +23,8 @@ def web_viewer_files() -> dict[str, tuple[str, bytes]]:
     """
     port, control = free_port(), free_port()
     arguments = ["--serve-web", "--web-viewer-port", str(port), "--port", str(control)]
-    with TemporaryFile() as logs, viewer_process(arguments, logs) as opened:
-        address(port, opened)
+    with TemporaryFile() as logs, viewer_process(arguments, logs) as process:
+        address(port, process)
         try:
             return {name: (mime_type, _get(port, name)) for name, mime_type in MIME_TYPES.items()}
         except (OSError, HTTPException) as error:
