@@ -1,10 +1,12 @@
 """The cause of an episode's outcome, and when the hand closed, computed from the states alone.
 
-The hand *closed* if its closure rose by at least CLOSED; the largest rise counts. It closed at the last state whose
-closure is within STILL of the start of that rise. The setting's expert closes at the first state after the start that
-satisfies Eq. 1 (d / d_first < d_c or d < 0.03 m); this needs no replay. The distances are taken from the episode, so
-the expert's time is exact until the bottle is touched. If the hand pushes the bottle ahead, the expert's time comes
-later; if it never comes, the end of the episode replaces it.
+The hand *closed* if its closure rose by at least CLOSED; the largest rise counts. It closed at the last state before
+the top of that rise whose closure is within STILL of the lowest closure.
+
+The setting's expert closes at the first state after the start that satisfies Eq. 1 (d / d_first < d_c or d < 0.03 m);
+this needs no replay. The distances are taken from the episode, so the expert's time is exact until the bottle is
+touched. If the hand pushes the bottle ahead, the expert's time comes later; if it never comes, the end of the episode
+replaces it.
 
 The cause is the first row that applies:
 
@@ -13,7 +15,7 @@ The cause is the first row that applies:
 | `agent failed` | an action was not allowed |
 | `solved` | scores 20 |
 | `slipped` | the bottle was raised (to RAISED or higher) and came down again by DROP or more |
-| `never reached` | the bottle did not move by TOUCH, and the palm centre stayed REACHED or more from its axis |
+| `never reached` | the bottle moved by less than TOUCH, and the palm centre stayed REACHED or more from its axis |
 | `too early` | the hand closed before the expert would have closed |
 | `too late` | the hand closed later than experts do (IN_TIME) |
 | `too late` | the bottle is up at the end: the hand raised it after the countdown had begun |
@@ -36,7 +38,7 @@ from dextron_bench.world import model, task
 
 CAUSES = ("solved", "too early", "too late", "knocked over", "slipped", "never reached", "agent failed")
 
-# Measured on episodes of experts, of experts with other d_c, and of agents without vision: see docs/diagnosis.md.
+# Measured on episodes of experts, of experts with other d_c, and of agents that ignore states (docs/diagnosis.md).
 CLOSED = 0.08  # Rise of closure; the smallest rise of an early grasp that failed was 0.086.
 STILL = 0.02
 IN_TIME = 6 * model.CONTROL_STEP  # [s] the largest lag of an expert's own episodes.
