@@ -19,10 +19,10 @@ from dextron_bench.success.predict import predict
 from dextron_bench.world.model import CONTROL_STEP
 
 KINDS = {
-    "fading": "hope that fades by wrong actions",
-    "early": "a closing that came too early",
-    "expert": "right for an expert",
-    "policy": "right for a policy",
+    "fading": "wrong actions lower the chance",
+    "early": "the hand closes too early",
+    "expert": "correct for an expert",
+    "policy": "correct for a policy",
     "wrong": "the model is wrong",
 }
 EXPERT = "expert"  # The player of an episode that no policy plays.
