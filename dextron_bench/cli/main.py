@@ -1,7 +1,6 @@
-"""The command line: the table of commands, and how an error becomes one line and an exit code.
+"""The entry point of the command line: parses the arguments and turns each error into one line and an exit code.
 
-A command is a frozen dataclass: its fields are the flags, its docstring is the help, and its call does the work. The
-modules of commands import nothing heavy, so that `--help` is quick.
+The modules of commands import nothing heavy at their top, so that `--help` is quick.
 """
 
 from __future__ import annotations
@@ -11,83 +10,13 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr
-from typing import Annotated, Any, Protocol, Union
+from typing import Annotated, Any, Union
 
 import tyro
 
-from dextron_bench.cli import (
-    check,
-    compare,
-    data,
-    data_export,
-    data_synthetic,
-    doctor,
-    figures,
-    leaderboard,
-    leaderboard_verify,
-    mc,
-    method_flags,
-    new_agent,
-    recordings,
-    recordings_choose,
-    run,
-    splits,
-    submit,
-    success,
-    success_eval,
-    view,
-)
-from dextron_bench.cli import eval as evaluation
-from dextron_bench.cli import list as listing
+from dextron_bench.cli import method_flags
+from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
-
-
-class Command(Protocol):
-    """Does its work when it is called, and returns the exit code."""
-
-    def __call__(self) -> int: ...
-
-
-Group = tuple[str, dict[str, type[Command]]]  # The description of a group of commands, and its commands.
-
-COMMANDS: dict[str, type[Command] | Group] = {
-    "run": run.Run,
-    "eval": evaluation.Eval,
-    "leaderboard": (
-        "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
-        "add a submission to it.",
-        {
-            **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
-            **{"verify": leaderboard_verify.Verify, "add": leaderboard_verify.Add},
-        },
-    ),
-    "new-agent": new_agent.NewAgent,
-    "check": check.Check,
-    "submit": submit.Submit,
-    "compare": compare.Compare,
-    "view": view.View,
-    "recordings": (
-        "Recordings: list them, export one as a film or a table, choose a few from the runs.",
-        {"list": recordings.List, "export": recordings.Export, "choose": recordings_choose.Choose},
-    ),
-    "list": listing.List,
-    "data": (
-        "Reaches: import or download the recorded ones, describe a source, fit and evaluate the synthetic ones; "
-        "export episodes for offline learning.",
-        {
-            **{"import": data.Import, "fetch": data.Fetch, "info": data.Info},
-            **{"fit": data_synthetic.Fit, "likeness": data_synthetic.Likeness, "export": data_export.Export},
-        },
-    ),
-    "mc": mc.MonteCarlo,
-    "splits": splits.Splits,
-    "success": (
-        "The success model: generate its data set, train it, evaluate it, explain episodes with it.",
-        {"data": success.Data, "train": success.Train, "eval": success_eval.Eval, "explain": success_eval.Explain},
-    ),
-    "figures": figures.Figures,
-    "doctor": doctor.Doctor,
-}
 
 BLAS = "OPENBLAS_NUM_THREADS"  # NumPy's products are small here, so more threads would mostly wait for each other.
 PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
@@ -149,9 +78,8 @@ def _parse(arguments: Sequence[str]) -> Command:
     """The command that the arguments select; wrong arguments end the process with one line and code 2."""
     if arguments and arguments[0] in method_flags.COMMANDS:
         command = method_flags.with_method_settings(arguments, COMMANDS[arguments[0]])
-        commands: dict[str, Any] = {**COMMANDS, arguments[0]: command}
         with method_flags.as_bad_settings(arguments):
-            return _parse_commands(commands, arguments)
+            return _parse_commands({**COMMANDS, arguments[0]: command}, arguments)
     return _parse_commands(COMMANDS, arguments)
 
 

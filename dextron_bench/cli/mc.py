@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
@@ -56,13 +57,13 @@ class MonteCarlo:
                 progress, montecarlo.Share.parse(self.share),
             )  # fmt: skip
         file, summary = database.save(draws, source, search, folder, f"experts-{self.reaches}")
-        if self.json:
-            print_json(summary)
-            return DONE
+        print_json(summary) if self.json else self._print(summary, file)
+        return DONE
+
+    def _print(self, summary: dict[str, Any], file: Path) -> None:
         columns = ["by", "value", "draws", "kept", "solved", "kept [%]", "solved [%]"]
         rows = [
             [*list(row.values())[:5], 100 * row["kept_rate"], 100 * row["solved_rate"]] for row in summary["statistics"]
         ]
         print_table(f"{self.reaches}: {summary['kept']} of {summary['draws']} draws kept", columns, rows)
         print(f"{summary['kept']} rows ({summary['solved']} of return 20) of {summary['draws']} draws: {file}")
-        return DONE

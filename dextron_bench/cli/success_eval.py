@@ -15,9 +15,10 @@ from dextron_bench.cli.success import folder_of
 from dextron_bench.reaches.sources import RankedSource
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from dextron_bench.experts.policies import Case
+    from dextron_bench.success.exemplars import PredictedEpisode
     from dextron_bench.success.network import SuccessModel
 
 
@@ -111,25 +112,23 @@ class Explain:
         chosen = exemplars.choose(exemplars.play_and_predict(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
         figures.ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self.into)
-        columns = ["kind", "player", "row", "reach", "return", "cause", "correct steps [%]"]
-        numbers = {case.setting: row for row, case in enumerate(cases)}
-        cells = [
-            [
-                kind,
-                predicted.player,
-                numbers[predicted.episode.setting],
-                predicted.episode.setting.reach,
-                predicted.episode.score,
-                predicted.diagnosis.cause,
-                predicted.accuracy * 100,
-            ]
-            for kind, predicted in chosen.items()
-        ]
-        print_table("episodes", columns, cells)
+        _print_exemplars(chosen, cases)
         if lacking := [title for kind, title in exemplars.KINDS.items() if kind not in chosen]:
             print(f"dextron-bench: no episode of this kind: {'; '.join(lacking)}", file=sys.stderr)
         print(self.into)
         return DONE
+
+
+def _print_exemplars(chosen: Mapping[str, PredictedEpisode], cases: Sequence[Case]) -> None:
+    columns = ["kind", "player", "row", "reach", "return", "cause", "correct steps [%]"]
+    numbers = {case.setting: row for row, case in enumerate(cases)}
+    rows = []
+    for kind, predicted in chosen.items():
+        episode = predicted.episode
+        place = numbers[episode.setting], episode.setting.reach
+        outcome = episode.score, predicted.diagnosis.cause, 100 * predicted.accuracy
+        rows.append([kind, predicted.player, *place, *outcome])
+    print_table("episodes", columns, rows)
 
 
 def _first(cases: Sequence[Case], rows: int) -> Sequence[Case]:

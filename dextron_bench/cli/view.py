@@ -115,15 +115,11 @@ class View:
         from dextron_bench import recording
         from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.runs import selection
         from dextron_bench.splits.loading import load_split
         from dextron_bench.success import live as success_live
         from dextron_bench.success import network
 
-        if len(self.method) != 1:
-            raise selection.BadFilter("--live takes one --method, such as rlil or exp")
-        if not 0.0 <= self.speed < float("inf"):
-            raise selection.BadFilter(f"--speed must be a multiple of real time, or 0 for no delay, not {self.speed:g}")
+        self._check_live()
         reaches = self.reaches[0] if self.reaches else "synthetic"
         label, agent = weights.agent_by_name(self.method[0], reaches, self.seed[0] if self.seed else 0)
         split = load_split(reaches, self.split[0] if self.split else "test")
@@ -138,6 +134,14 @@ class View:
                 print(f"{label} on row {row} of {split.name}: {episode.score:g} of 20")
             wait()
         return DONE
+
+    def _check_live(self) -> None:
+        from dextron_bench.runs.selection import BadFilter
+
+        if len(self.method) != 1:
+            raise BadFilter("--live takes one --method, such as rlil or exp")
+        if not 0.0 <= self.speed < float("inf"):
+            raise BadFilter(f"--speed must be a multiple of real time, or 0 for no delay, not {self.speed:g}")
 
     def _filter(self) -> EpisodeFilter:
         from dextron_bench.runs.selection import EpisodeFilter

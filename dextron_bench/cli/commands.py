@@ -1,0 +1,77 @@
+"""The table of commands. A command is a frozen dataclass: its fields are the flags, its docstring is the help."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from dextron_bench.cli import (
+    check,
+    compare,
+    data,
+    data_export,
+    data_synthetic,
+    doctor,
+    figures,
+    leaderboard,
+    leaderboard_verify,
+    mc,
+    new_agent,
+    recordings,
+    recordings_choose,
+    run,
+    splits,
+    submit,
+    success,
+    success_eval,
+    view,
+)
+from dextron_bench.cli import eval as evaluation
+from dextron_bench.cli import list as listing
+
+
+class Command(Protocol):
+    """Does its work when it is called, and returns the exit code."""
+
+    def __call__(self) -> int: ...
+
+
+Group = tuple[str, dict[str, type[Command]]]  # The description of a group of commands, and its commands.
+
+COMMANDS: dict[str, type[Command] | Group] = {
+    "run": run.Run,
+    "eval": evaluation.Eval,
+    "leaderboard": (
+        "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
+        "add a submission to it.",
+        {
+            **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
+            **{"verify": leaderboard_verify.Verify, "add": leaderboard_verify.Add},
+        },
+    ),
+    "new-agent": new_agent.NewAgent,
+    "check": check.Check,
+    "submit": submit.Submit,
+    "compare": compare.Compare,
+    "view": view.View,
+    "recordings": (
+        "Recordings: list them, export one as a film or a table, choose a few from the runs.",
+        {"list": recordings.List, "export": recordings.Export, "choose": recordings_choose.Choose},
+    ),
+    "list": listing.List,
+    "data": (
+        "Reaches: import or download the recorded ones, describe a source, fit and evaluate the synthetic ones; "
+        "export episodes for offline learning.",
+        {
+            **{"import": data.Import, "fetch": data.Fetch, "info": data.Info},
+            **{"fit": data_synthetic.Fit, "likeness": data_synthetic.Likeness, "export": data_export.Export},
+        },
+    ),
+    "mc": mc.MonteCarlo,
+    "splits": splits.Splits,
+    "success": (
+        "The success model: generate its data set, train it, evaluate it, explain episodes with it.",
+        {"data": success.Data, "train": success.Train, "eval": success_eval.Eval, "explain": success_eval.Explain},
+    ),
+    "figures": figures.Figures,
+    "doctor": doctor.Doctor,
+}
