@@ -24,7 +24,7 @@ from dextron_bench.world.engine import Engine
 CAPACITY = 1_000_000  # Transitions in either buffer (table II).
 FRAMES = 1000  # Control steps of the agent in an epoch.
 
-NETWORKS, EPISODES, DEMONSTRATIONS, ACTING, WARM_START, PICKS, NOISE = range(7)  # The random streams of each seed.
+NETWORKS, EPISODES, DEMONSTRATIONS, ACTING, WARM_START, BATCHES, NOISE = range(7)  # The random streams of each seed.
 
 
 class Cycle:
@@ -53,7 +53,7 @@ class Cycle:
     def advance(self) -> list[dict[str, float]]:
         """Trains for FRAMES cycles; returns each seed's losses, number of finished episodes and their mean return."""
         acting, random = self._normal(ACTING, 1), self._uniform(WARM_START, 1) * 2.0 - 1.0
-        picks = self._uniform(PICKS, BATCH)
+        selections = self._uniform(BATCHES, BATCH)
         noise = torch.tensor(self._normal(NOISE, BATCH)[..., None], dtype=torch.float32, device=self._track.device)
         losses: list[Tensor] = []
         scores: list[list[float]] = [[] for _ in self._seeds]
@@ -61,7 +61,7 @@ class Cycle:
             is_warm = self._frames >= self._schedule.warm_start
             self._step(self._act(acting[t]) if is_warm else random[t], scores)
             if is_warm:
-                losses.append(self._sac.update(self._batch(picks[t]), noise[t]))
+                losses.append(self._sac.update(self._batch(selections[t]), noise[t]))
         self.epoch += 1
         return self._metrics(losses, scores)
 

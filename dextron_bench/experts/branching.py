@@ -1,9 +1,9 @@
 """Plays many experts on one setting in little more time than one expert takes.
 
-Experts of equal gain act equally until the first of them closes. So one episode, the stem, is simulated with the hand
-opening. It is forked each time the hand comes within the critical distance of another expert. If the bottle falls
-during the stem, all experts that have not closed fail at once. The outcomes are bit-equal to the outcomes of the same
-experts played one by one.
+Experts of equal gain act equally until the first of them closes. So they share one episode, in which the hand opens.
+The shared episode is forked each time the hand comes within the critical distance of another expert. If the bottle
+falls in the shared episode, all experts that have not closed fail at once. The outcomes are bit-equal to the outcomes
+of the same experts played one by one.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ def play(engine: Engine, batches: Iterable[ExpertBatch]) -> Iterator[tuple[int, 
 
 
 class _BranchingRollout:
-    """The current episodes: one stem per batch, and one episode per expert that has closed.
+    """The current episodes: one shared episode per batch, and one episode per expert that has closed.
 
-    Experts are ranked by critical distance, the largest first. `_expert` is the rank of a slot's expert; for a stem, it
-    is the rank of the next expert to close. Enough free slots are reserved for all forks of the current stems.
+    Experts are ranked by critical distance, the largest first. `_expert` is the rank of a slot's expert; in a
+    shared episode, it is the rank of the next expert to close. Free slots are reserved for all forks to come.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -59,7 +59,7 @@ class _BranchingRollout:
         self._live = np.zeros(0, int)
         self._number = np.zeros(n, int)
         self._expert = np.zeros(n, int)
-        self._is_stem = np.zeros(n, bool)
+        self._is_shared = np.zeros(n, bool)
         self._gain, self._critical, self._first, self._return = np.zeros((4, n))
         self._length = np.zeros(n, int)
         state = (self._number, self._expert, self._gain, self._critical, self._first, self._return, self._length)
@@ -92,7 +92,7 @@ class _BranchingRollout:
         self._ranks[number] = np.argsort(-batch.criticals, kind="stable")
         self._outcomes[number] = Outcomes(np.zeros(count), np.zeros(count, int))
         self._unfinished[number] = count
-        self._number[slot], self._is_stem[slot], self._expert[slot] = number, True, 0
+        self._number[slot], self._is_shared[slot], self._expert[slot] = number, True, 0
         self._gain[slot], self._critical[slot] = batch.gain, batch.criticals.max()
         self._first[slot] = task.distance(state)[0]
         self._return[slot] = self._length[slot] = 0
@@ -101,11 +101,11 @@ class _BranchingRollout:
         states = self._engine.states(self._live)
         started = self._length[self._live] > 0
         within = self._is_closing(self._live, task.distance(states))
-        for slot in self._live[within & started & self._is_stem[self._live]]:
+        for slot in self._live[within & started & self._is_shared[self._live]]:
             self._fork(slot)
         live = self._live
         states = self._engine.states(live)
-        closing = self._is_closing(live, task.distance(states)) & ~self._is_stem[live]
+        closing = self._is_closing(live, task.distance(states)) & ~self._is_shared[live]
         actions = policies.closing_speeds(task.closure(states), closing, self._gain[live])
         actions[self._length[live] == 0] = 0.0
         step = self._engine.step(live, actions)
@@ -118,29 +118,29 @@ class _BranchingRollout:
         return policies.is_closing(distances, self._first[slots], self._critical[slots])
 
     def _fork(self, slot: int) -> None:
-        """Forks a stem for each expert that closes now; the last expert takes over the stem's own slot."""
+        """Forks a shared episode for each expert that closes now; the last expert keeps the slot."""
         number = self._number[slot]
         batch, ranks = self._batches[number], self._ranks[number]
         distance = task.distance(self._engine.states(np.array([slot])))
         while self._is_closing(np.array([slot]), distance)[0]:
             if self._expert[slot] == len(ranks) - 1:
-                self._is_stem[slot] = False
+                self._is_shared[slot] = False
                 return
             branch = self._free.pop()
             self._reserved -= 1
             self._engine.fork(np.array([slot]), np.array([branch]))
             for per_slot in self._per_slot:
                 per_slot[branch] = per_slot[slot]
-            self._is_stem[branch] = False
+            self._is_shared[branch] = False
             self._live = np.append(self._live, branch)
             self._expert[slot] += 1
             self._critical[slot] = batch.criticals[ranks[self._expert[slot]]]
 
     def _finish(self, slot: int) -> list[tuple[int, Outcomes]]:
-        """Stores the end of an episode: of one expert, or of all experts of a stem that have not closed."""
+        """Stores the end of an episode: of one expert, or of all experts of a shared episode that have not closed."""
         number, rank = self._number[slot], self._expert[slot]
         ranks, outcomes = self._ranks[number], self._outcomes[number]
-        ended = ranks[rank:] if self._is_stem[slot] else ranks[rank : rank + 1]
+        ended = ranks[rank:] if self._is_shared[slot] else ranks[rank : rank + 1]
         outcomes.returns[ended], outcomes.lengths[ended] = self._return[slot], self._length[slot]
         self._reserved -= len(ended) - 1
         self._free.append(slot)
