@@ -114,8 +114,8 @@ class Likeness:
 def print_likeness(tables: dict[str, pd.DataFrame]) -> None:
     """Prints the tables of `two_sample.study`."""
     held_out, strangers = with_interval(tables["held out"]), with_interval(tables["strangers"])
-    whole = held_out[held_out["stratum"] == "all"]
-    print_pivot("AUC [95 %] on held-out reaches", whole, "group", "classifier")
+    total = held_out[held_out["stratum"] == "all"]
+    print_pivot("AUC [95 %] on held-out reaches", total, "group", "classifier")
     for group, rows in held_out[held_out["classifier"] == "forest"].groupby("group", sort=False):
         print_regions(f"AUC ± half of 95 % interval, forest, {group}", rows)
     for classifier, rows in strangers.groupby("classifier", sort=False):

@@ -121,5 +121,5 @@ def _source(name: str) -> Finding:
         reaches = sources.open_source(name).names
     except (LookupError, ValueError, ImportError, OSError) as error:
         return Finding(f"reaches {name}", False, needed, str(error))
-    where = f", cache {cache.cache_file()}" if name == "real" else ""
-    return Finding(f"reaches {name}", True, needed, f"{len(reaches)}{where}")
+    location = f", cache {cache.cache_file()}" if name == "real" else ""
+    return Finding(f"reaches {name}", True, needed, f"{len(reaches)}{location}")

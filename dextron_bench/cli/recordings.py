@@ -44,17 +44,17 @@ class List:
 
         files = selection.recordings(self.place)
         summaries = list(recording.summarise(files, self.check, selection.hashes(files) if self.check else {}))
-        whole = [summary for summary in summaries if not summary.damage]
+        undamaged = [summary for summary in summaries if not summary.damage]
         if self.json:
             print_json([_row(summary) for summary in summaries])
-        elif whole:
-            rows = [_row(summary) for summary in whole]
+        elif undamaged:
+            rows = [_row(summary) for summary in undamaged]
             cells = [["" if cell is None else cell for cell in list(row.values())[:-1]] for row in rows]
             print_table("recordings", list(rows[0])[:-1], cells)
         for summary in summaries:
             if summary.damage:
                 print(f"dextron-bench: {summary.file}: {summary.damage}", file=sys.stderr)
-        return DONE if len(whole) == len(summaries) else DIFFERS
+        return DONE if len(undamaged) == len(summaries) else DIFFERS
 
 
 @dataclass(frozen=True)

@@ -113,8 +113,8 @@ class Explain:
         self.into.parent.mkdir(parents=True, exist_ok=True)
         figures.ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self.into)
         _print_exemplars(chosen, cases)
-        if lacking := [title for kind, title in exemplars.KINDS.items() if kind not in chosen]:
-            print(f"dextron-bench: no episode of this kind: {'; '.join(lacking)}", file=sys.stderr)
+        if missing := [title for kind, title in exemplars.KINDS.items() if kind not in chosen]:
+            print(f"dextron-bench: no episode of this kind: {'; '.join(missing)}", file=sys.stderr)
         print(self.into)
         return DONE
 
@@ -125,9 +125,9 @@ def _print_exemplars(chosen: Mapping[str, PredictedEpisode], cases: Sequence[Cas
     rows = []
     for kind, predicted in chosen.items():
         episode = predicted.episode
-        place = numbers[episode.setting], episode.setting.reach
+        case = numbers[episode.setting], episode.setting.reach
         outcome = episode.score, predicted.diagnosis.cause, 100 * predicted.accuracy
-        rows.append([kind, predicted.player, *place, *outcome])
+        rows.append([kind, predicted.player, *case, *outcome])
     print_table("episodes", columns, rows)
 
 

@@ -80,14 +80,14 @@ class View:
 
         if self.live:
             return self._play_live()
-        places, wanted = self._places(), self._filter()
-        files = [self._side_by_side(places, wanted)] if self.diff else self._recordings(places, wanted)
-        whole = _undamaged(files)
+        places, episode_filter = self._places(), self._filter()
+        files = [self._side_by_side(places, episode_filter)] if self.diff else self._recordings(places, episode_filter)
+        undamaged = _undamaged(files)
         if self.print:
-            print(*whole, sep="\n")
+            print(*undamaged, sep="\n")
         else:
-            recording.view(whole)
-        return DONE if len(whole) == len(files) else DIFFERS
+            recording.view(undamaged)
+        return DONE if len(undamaged) == len(files) else DIFFERS
 
     def _places(self) -> list[Path]:
         """The places of recordings; a submission is unpacked in the folder of runs."""
@@ -96,20 +96,20 @@ class View:
         places = self.place or (self.runs,)
         return [unpack_for_viewing(place, self.runs) if place.suffix == ".zip" else place for place in places]
 
-    def _recordings(self, places: Sequence[Path], wanted: EpisodeFilter) -> list[Path]:
+    def _recordings(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
         from dextron_bench.runs import selection
 
-        if wanted == selection.EpisodeFilter():
+        if episode_filter == selection.EpisodeFilter():
             return selection.recordings(places)
-        return self._select(places, wanted)
+        return self._select(places, episode_filter)
 
-    def _side_by_side(self, places: Sequence[Path], wanted: EpisodeFilter) -> Path:
+    def _side_by_side(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> Path:
         from dextron_bench.runs import selection, side_by_side
 
         if len(places) != 2:
             raise selection.BadFilter(f"--diff takes two places, recordings or runs; there are {len(self.place)}")
         first, second = places
-        return side_by_side.side_by_side(first, second, wanted, self.runs)
+        return side_by_side.side_by_side(first, second, episode_filter, self.runs)
 
     def _play_live(self) -> int:
         from dextron_bench import recording
@@ -148,16 +148,16 @@ class View:
 
         return EpisodeFilter(**{name: getattr(self, name) for name in EpisodeFilter.__slots__})
 
-    def _select(self, places: Sequence[Path], wanted: EpisodeFilter) -> list[Path]:
+    def _select(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
         """The recordings of selected episodes; prints a table of them unless --print is set."""
         from dextron_bench.runs import rerecording, selection
 
-        table, matching = selection.select(selection.episodes(places), wanted)
+        table, matching = selection.select(selection.episodes(places), episode_filter)
         with progress_bar("recordings", self.quiet) as progress:
             files = rerecording.rerecord(table, progress)
         if not self.print:
             _print_episodes(table)
-        if len(table) < matching and wanted.worst is None and wanted.best is None:
+        if len(table) < matching and episode_filter.worst is None and episode_filter.best is None:
             line = (
                 f"{matching} episodes pass the filter; these are the first {len(table)}, --worst {matching} selects all"
             )

@@ -108,10 +108,10 @@ def align(
 
 def _seed_scores(name: str, results: Results, reaches: str, split: str) -> SeedScores:
     seeds = [result for result in results if result["reaches"] == reaches]
-    if lacking := [result for result in seeds if split not in result["splits"]]:
+    if without_split := [result for result in seeds if split not in result["splits"]]:
         raise Incomparable(
-            f"{name}, seed {lacking[0]['seed']}, has no split {split!r} of {reaches} reaches; "
-            f"it has {_sorted_list(lacking[0]['splits'])}"
+            f"{name}, seed {without_split[0]['seed']}, has no split {split!r} of {reaches} reaches; "
+            f"it has {_sorted_list(without_split[0]['splits'])}"
         )
     splits = [result["splits"][split] for result in seeds]
     if len({(result["digest"], len(result["scores"])) for result in splits}) > 1:
