@@ -26,3 +26,15 @@ def test_public_modules_import_only_public_modules():
     code = f"import {', '.join(sorted(PUBLIC))}, sys; print(*(m for m in sys.modules if m.startswith('dextron_bench')))"
     imported = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
     assert set(imported) - {"dextron_bench.world.registration"} == PUBLIC  # Every import of the package registers.
+
+
+def test_public_names_that_were_used_before_are_hidden_too():
+    code = """
+import dextron_bench
+from dextron_bench.methods.isolation import guard
+before = dextron_bench.rollout, dextron_bench.Perceptron
+guard.hide_simulator()
+print(*sorted({"rollout", "Perceptron"} & vars(dextron_bench).keys()))
+"""
+    output = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert output.split() == ["Perceptron"]

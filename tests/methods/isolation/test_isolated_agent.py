@@ -95,7 +95,7 @@ def test_a_file_may_hold_a_learner_and_its_agent(agent_spec: Callable[[str], str
 
 
 def test_an_agent_may_import_the_public_names_of_policies(agent_spec: Callable[[str], str]):
-    names = "Agent, Expert, ExpertAgent, Learner, Perceptron, SuccessModel, Trainer, Track"
+    names = "Agent, Case, Expert, ExpertAgent, Learner, Perceptron, SuccessModel, Trainer, Track"
     (episode,) = play(agent_spec(f"from dextron_bench import {names}; return np.zeros((len(states), 1))"), CASES[:1])
     assert episode.failure == ""
 
