@@ -1,4 +1,4 @@
-"""The published leaderboard: what is taken over from runs, and what is made of it."""
+"""The published leaderboard: `build` copies finished runs into it, and computes tables and page from its results."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from tests.helpers import tiny_benchmark, tiny_training
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A working folder in the tiny world with a run of the toy learner, two seeds, and of `nothing`."""
+    """A working folder on the tiny benchmark, with runs of the toy learner (two seeds) and of `nothing`."""
     tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        weights, "shipped_folder", lambda learner, reaches: tmp_path / "beside" / learner.label / reaches
+        weights, "shipped_folder", lambda learner, reaches: tmp_path / "shipped" / learner.label / reaches
     )
     common = ["--quiet", "--no-floors", "--record", "0"]
     toy = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--seed", "0", "1"]
@@ -37,18 +37,18 @@ def build(*words: str) -> int:
     return main.main(["leaderboard", "build", "--into", "board", *words])
 
 
-def test_results_curves_and_weights_are_taken_over_as_they_are(here: Path):
+def test_results_curves_and_weights_are_copied_unchanged(here: Path):
     assert build("--runs", "runs") == 0
     run, published = here / "runs/toy-0.1/synthetic/seed1", here / "board/results/toy-0.1/synthetic/seed1"
     assert sorted(file.name for file in published.iterdir()) == ["curve.json", "result.json"]
     for name in ("curve.json", "result.json"):
         assert (published / name).read_bytes() == (run / name).read_bytes()
-    shipped = here / "beside/toy-0.1/synthetic/seed1.safetensors"
+    shipped = here / "shipped/toy-0.1/synthetic/seed1.safetensors"
     assert shipped.read_bytes() == (run / "weights.safetensors").read_bytes()
     assert [file.name for file in (here / "board/results/nothing/synthetic/seed0").iterdir()] == ["result.json"]
 
 
-def test_the_tables_are_those_of_the_results(here: Path):
+def test_the_tables_are_computed_from_the_results(here: Path):
     assert build("--runs", "runs") == 0
     rows = standings.table(result_files.results(here / "runs"))
     written = pd.read_csv(here / "board/table.csv")
@@ -56,17 +56,17 @@ def test_the_tables_are_those_of_the_results(here: Path):
     assert written["return"].to_numpy() == pytest.approx(rows["return"].to_numpy())
     text = (here / "board/README.md").read_text()
     row = rows[(rows["method"] == "toy-0.1") & (rows["split"] == "test")].iloc[0]
-    shown = f"{row['return']:.2f} [{row['return_low']:.2f}, {row['return_high']:.2f}], {100 * row['success']:.1f} %"
-    assert f"| {row['rank']:.0f} | `toy-0.1` | 2 | self-reported | {shown} |" in text
-    again = json.loads((here / "board/table.json").read_text())
-    assert [each["tier"] for each in again] == written["tier"].tolist()
-    assert [each["frames"] for each in again if each["method"] == "nothing"] == [None, None]
-    shares = [f"{25.0 * row[cause]:.1f}" for cause in CAUSES]  # Of two seeds' two episodes.
+    cell = f"{row['return']:.2f} [{row['return_low']:.2f}, {row['return_high']:.2f}], {100 * row['success']:.1f} %"
+    assert f"| {row['rank']:.0f} | `toy-0.1` | 2 | self-reported | {cell} |" in text
+    records = json.loads((here / "board/table.json").read_text())
+    assert [record["tier"] for record in records] == written["tier"].tolist()
+    assert [record["frames"] for record in records if record["method"] == "nothing"] == [None, None]
+    shares = [f"{25.0 * row[cause]:.1f}" for cause in CAUSES]  # Two seeds with two episodes each.
     assert f"| `toy-0.1` | {' | '.join(shares)} |" in text
     assert (here / "board/curves-synthetic.png").stat().st_size > 5000
 
 
-def test_what_a_person_wrote_stays_and_building_twice_changes_nothing(here: Path):
+def test_handwritten_text_stays_and_a_second_build_changes_nothing(here: Path):
     assert build("--runs", "runs") == 0
     readme = here / "board/README.md"
     readme.write_text(readme.read_text().replace("# Leaderboard", "# Ours\n\nBefore.") + "\nAfter.\n")
@@ -88,14 +88,14 @@ def test_an_unfinished_run_is_not_published(here: Path, complaint: Callable[...,
     assert not (here / "board").exists()
 
 
-def test_what_verification_noted_stays_while_nothing_else_changes(here: Path):
+def test_the_tier_stays_until_the_scores_change(here: Path):
     assert build("--runs", "runs") == 0
     file = here / "board/results/nothing/synthetic/seed0/result.json"
-    noted = json.loads(file.read_text()) | {"tier": "re-run"}
-    file.write_text(json.dumps(noted))
+    verified = json.loads(file.read_text()) | {"tier": "re-run"}
+    file.write_text(json.dumps(verified))
     assert build("--runs", "runs") == 0
     assert json.loads(file.read_text())["tier"] == "re-run"
-    noted["splits"]["test"]["scores"][0] = 20.0
-    file.write_text(json.dumps(noted))
+    verified["splits"]["test"]["scores"][0] = 20.0
+    file.write_text(json.dumps(verified))
     assert build("--runs", "runs") == 0
     assert "tier" not in json.loads(file.read_text())

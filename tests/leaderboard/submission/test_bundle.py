@@ -1,4 +1,4 @@
-"""Bundles from strangers: paths, kinds, links, sizes and hashes that no bundle of the tool has are refused."""
+"""Bundles from strangers: paths, kinds, links, sizes and hashes that a valid bundle never has are refused."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from tests.helpers import tiny_benchmark
 
 
 class Unsafe:
-    """Makes bundles that nobody's tool would."""
+    """A valid bundle, to which a test adds unsafe members."""
 
-    def __init__(self, sound: Path, file: Path) -> None:
-        with zipfile.ZipFile(sound) as archive:
+    def __init__(self, valid: Path, file: Path) -> None:
+        with zipfile.ZipFile(valid) as archive:
             self.members = [(info, archive.read(info)) for info in archive.infolist()]
         self.file = file
 
@@ -30,7 +30,7 @@ class Unsafe:
         return self
 
     def refused(self, into: Path) -> str:
-        """Why it is refused, after nothing was written but in the folder it was to go to."""
+        """The reason of the refusal; asserts that nothing was written outside the folder `into`."""
         with zipfile.ZipFile(self.file, "w") as archive, warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Duplicate name")
             for info, content in self.members:
@@ -59,33 +59,33 @@ def unsafe(submitted: Path, tmp_path: Path) -> Unsafe:
         "C:x",
     ],
 )
-def test_paths_and_kinds_that_no_bundle_has_are_refused(name: str, unsafe: Unsafe, tmp_path: Path):
+def test_paths_and_kinds_that_a_bundle_cannot_hold_are_refused(name: str, unsafe: Unsafe, tmp_path: Path):
     assert f"a bundle cannot hold a file {name!r}" in unsafe.add(name, b"x").refused(tmp_path / "into")
 
 
-def test_ways_of_packing_that_hide_sizes_are_refused(unsafe: Unsafe, tmp_path: Path):
+def test_a_compression_method_without_a_size_limit_is_refused(unsafe: Unsafe, tmp_path: Path):
     unsafe.add("agent/zeros.pt", bytes(2**20))
     unsafe.members[-1][0].compress_type = zipfile.ZIP_BZIP2
     assert "uses a compression method whose output size cannot be limited" in unsafe.refused(tmp_path / "into")
 
 
-def test_links_twins_and_strays_are_refused(submitted: Path, unsafe: Unsafe, tmp_path: Path):
+def test_links_duplicates_and_unlisted_files_are_refused(submitted: Path, unsafe: Unsafe, tmp_path: Path):
     link = zipfile.ZipInfo("agent/link.py")
     link.external_attr = (stat.S_IFLNK | 0o777) << 16
     assert "is a link" in unsafe.add(link, b"/etc/passwd").refused(tmp_path / "into")
-    twin = Unsafe(submitted / "near.zip", unsafe.file).add("seed0/result.json", b"{}")
-    assert "holds seed0/result.json twice" in twin.refused(tmp_path / "into")
-    stray = Unsafe(submitted / "near.zip", unsafe.file).add("agent/more.py", b"")
-    assert "holds agent/more.py, which its manifest does not list" in stray.refused(tmp_path / "into")
+    duplicate = Unsafe(submitted / "near.zip", unsafe.file).add("seed0/result.json", b"{}")
+    assert "holds seed0/result.json twice" in duplicate.refused(tmp_path / "into")
+    unlisted = Unsafe(submitted / "near.zip", unsafe.file).add("agent/more.py", b"")
+    assert "holds agent/more.py, which its manifest does not list" in unlisted.refused(tmp_path / "into")
 
 
-def test_a_bomb_is_refused_before_it_is_unpacked(unsafe: Unsafe, tmp_path: Path):
+def test_a_zip_bomb_is_refused_before_it_is_unpacked(unsafe: Unsafe, tmp_path: Path):
     bomb = unsafe.add("agent/zeros.pt", bytes(bundle.LARGEST + 1))
     assert "agent/zeros.pt is too large when unpacked (256 MiB)" in bomb.refused(tmp_path / "into")
     assert bomb.file.stat().st_size < 2**21
 
 
-def test_a_bomb_of_many_files_is_refused(unsafe: Unsafe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_zip_bomb_of_many_files_is_refused(unsafe: Unsafe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(bundle, "TOTAL", 1000)
     assert "would unpack to more than" in unsafe.refused(tmp_path / "into")
 
@@ -101,18 +101,18 @@ def test_a_changed_byte_is_refused(submitted: Path, unsafe: Unsafe, tmp_path: Pa
         bundle.unpack(cut, tmp_path / "other")
 
 
-def test_only_what_belongs_to_the_seeds_is_packed(submitted: Path, tmp_path: Path):
-    """A write that was cut off leaves its part, and a seed that was played is not always submitted."""
+def test_only_files_of_the_entered_seeds_are_packed(submitted: Path, tmp_path: Path):
+    """An interrupted write leaves a partial file, and a seed that was played need not be submitted."""
     folder = submitted / "runs" / entry.FOLDER / "near" / tiny_benchmark.NAME
     shutil.copytree(folder, tmp_path / "near")
     (tmp_path / "near/seed0/.episodes.parquet.77.part").touch()
-    told = entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0,)).manifest()
-    found = bundle.pack(tmp_path / "near", told, {}, tmp_path / "near.zip")["files"]
-    assert {name.split("/")[0] for name in found} == {"seed0"}
-    assert not [name for name in found if "part" in name]
+    manifest = entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0,)).manifest()
+    names = bundle.pack(tmp_path / "near", manifest, {}, tmp_path / "near.zip")["files"]
+    assert {name.split("/")[0] for name in names} == {"seed0"}
+    assert not [name for name in names if "part" in name]
 
 
-def test_an_agents_file_that_no_bundle_takes_is_told_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_agents_file_that_a_bundle_cannot_hold_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     file = tmp_path / "_mine.py"
     file.touch()
     with pytest.raises(bundle.BadBundle, match=r"a bundle cannot hold a file 'agent/_mine\.py'"):
@@ -123,7 +123,7 @@ def test_an_agents_file_that_no_bundle_takes_is_told_first(tmp_path: Path, monke
 
 
 @pytest.mark.parametrize("hours", [float("nan"), float("inf"), 10**400, -1])
-def test_a_declaration_is_a_number(hours: float, submitted: Path):
+def test_declared_hours_must_be_a_finite_number(hours: float, submitted: Path):
     with zipfile.ZipFile(submitted / "near.zip") as archive:
         manifest = json.loads(archive.read(bundle.MANIFEST))
     bundle.check(manifest, "bundle", Path("near.zip"))
@@ -132,7 +132,7 @@ def test_a_declaration_is_a_number(hours: float, submitted: Path):
         bundle.check(manifest, "bundle", Path("near.zip"))
 
 
-def test_a_zip_of_something_else_is_named(tmp_path: Path):
+def test_a_zip_file_that_is_not_a_bundle_is_refused(tmp_path: Path):
     with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
         archive.writestr("bundle.json", '{"format": 1}')
     with pytest.raises(bundle.BadBundle, match="'name' is a required property"):

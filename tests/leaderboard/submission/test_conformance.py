@@ -1,4 +1,4 @@
-"""What `dextron-bench check` says of agents that are sound, and of those that are not; and the agent to begin with."""
+"""The checks of valid and invalid agents, and the template of `dextron-bench new-agent`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ import numpy as np
 
 class Agent:
     name = "mine"
-    drawn = np.random.default_rng()
+    rng = np.random.default_rng()
 
     def agent(self, seed):
         return self
@@ -50,49 +50,49 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     tiny_benchmark.forget()
 
 
-def found(tmp_path: Path, act: str) -> dict[str, Check]:
+def check(tmp_path: Path, act: str) -> dict[str, Check]:
     (tmp_path / "mine.py").write_text(AGENT.format(act=act))
     return {
         check.what: check for check in checks(prepare_launch(f"{tmp_path}/mine.py:Agent"), limits=Limits(answer=20.0))
     }
 
 
-def test_the_agent_to_begin_with_is_ready_and_passes_its_own_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_the_template_passes_the_checks_and_its_own_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     folder = tmp_path / "mine"
     assert main.main(["new-agent", str(folder)]) == 0
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"], cwd=folder, check=False)
-    assert done.returncode == 0
+    process = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"], cwd=folder, check=False)
+    assert process.returncode == 0
     assert main.main(["check", f"{folder}/agent.py:MyAgent"]) == 0
-    told = capsys.readouterr().out
-    assert "mend" not in told
-    assert "ready: dextron-bench submit" in told
+    printed = capsys.readouterr().out
+    assert "mend" not in printed
+    assert "ready: dextron-bench submit" in printed
     assert main.main(["new-agent", str(folder)]) == 2
     assert "exists already; name a new folder" in capsys.readouterr().err
 
 
-def test_what_is_drawn_without_the_seed_is_to_be_mended(tmp_path: Path):
-    told = found(tmp_path, "return self.drawn.uniform(-1, 1, (len(states), 1))")
-    assert told["it is deterministic under a seed"].verdict == MEND
-    assert told["actions do not depend on other rows"].verdict == NOTE
+def test_random_numbers_without_the_seed_are_a_fault(tmp_path: Path):
+    results = check(tmp_path, "return self.rng.uniform(-1, 1, (len(states), 1))")
+    assert results["it is deterministic under a seed"].verdict == MEND
+    assert results["actions do not depend on other rows"].verdict == NOTE
 
 
 def test_actions_that_depend_on_other_rows_are_noted(tmp_path: Path):
-    told = found(tmp_path, "return np.full((len(states), 1), 1.0 / len(states))")
-    assert told["it is deterministic under a seed"].verdict == OK
-    assert told["actions do not depend on other rows"].verdict == NOTE
+    results = check(tmp_path, "return np.full((len(states), 1), 1.0 / len(states))")
+    assert results["it is deterministic under a seed"].verdict == OK
+    assert results["actions do not depend on other rows"].verdict == NOTE
 
 
-def test_what_fails_ends_the_checks(tmp_path: Path):
-    told = found(tmp_path, "return np.full((len(states), 1), 2.0)")
-    assert list(told) == ["it starts", "actions are finite, in [-1, 1], one a row"]
-    assert "3 episodes failed: action 2 is outside [-1, 1] at step 0" in list(told.values())[1].detail
+def test_a_failure_ends_the_checks(tmp_path: Path):
+    results = check(tmp_path, "return np.full((len(states), 1), 2.0)")
+    assert list(results) == ["it starts", "actions are finite, in [-1, 1], one a row"]
+    assert "3 episodes failed: action 2 is outside [-1, 1] at step 0" in list(results.values())[1].detail
     (tmp_path / "mine.py").write_text("import nothing_of_that_name")
     (only,) = checks(prepare_launch(f"{tmp_path}/mine.py:Agent"))
     assert (only.what, only.verdict) == ("it starts", MEND)
     assert "nothing_of_that_name" in only.detail
 
 
-def test_an_agent_that_cannot_serve_many_episodes_is_to_be_mended(tmp_path: Path):
-    told = found(tmp_path, "return np.zeros((min(len(states), 9), 1))")
-    assert told["it is quick enough"].verdict == MEND
-    assert "act() must return floats of shape (256, 1)" in told["it is quick enough"].detail
+def test_an_agent_for_few_episodes_at_once_has_a_fault(tmp_path: Path):
+    results = check(tmp_path, "return np.zeros((min(len(states), 9), 1))")
+    assert results["it is quick enough"].verdict == MEND
+    assert "act() must return floats of shape (256, 1)" in results["it is quick enough"].detail

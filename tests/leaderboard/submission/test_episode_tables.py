@@ -1,4 +1,4 @@
-"""Tables of episodes from strangers: each form that no run writes is refused in a line, whatever it is meant to do."""
+"""Tables of episodes from strangers: a table that no run writes is refused with the reason."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.helpers.forged_bundles import Forgery, row
 
 
 @pytest.mark.parametrize(
-    ("change", "why"),
+    ("change", "reason"),
     [
         (lambda table: table.assign(row=table["row"].astype("Int64").where(table.index > 0)), "without its row"),
         (row(1, split=None), "without its split"),
@@ -25,16 +25,16 @@ from tests.helpers.forged_bundles import Forgery, row
         (lambda table: pd.concat([table, table[:1]]), "has 5 episodes, but the splits have 4"),
     ],
 )
-def test_forms_that_no_run_writes_are_refused(change, why: str, forged: Forgery):
+def test_values_and_columns_that_no_run_writes_are_refused(change, reason: str, forged: Forgery):
     forged.table(change)
-    assert why in forged.checked().problems[0]
+    assert reason in forged.checked().problems[0]
 
 
-def test_two_columns_of_a_name_are_refused(forged: Forgery):
+def test_duplicate_columns_are_refused(forged: Forgery):
     file = forged.seed / "episodes.parquet"
     table = pq.read_table(file)
-    twice = pa.Table.from_arrays([*table.columns, table.column("split")], names=[*table.column_names, "split"])
-    pq.write_table(twice, file)
+    duplicated = pa.Table.from_arrays([*table.columns, table.column("split")], names=[*table.column_names, "split"])
+    pq.write_table(duplicated, file)
     assert "differs in 'split'" in forged.checked().problems[0]
 
 
@@ -45,11 +45,11 @@ def test_more_row_groups_than_a_run_writes_are_refused(forged: Forgery, monkeypa
     assert "has 4 row groups, more than 3" in forged.checked().problems[0]
 
 
-def test_what_is_no_table_is_refused(forged: Forgery):
+def test_a_file_that_is_not_a_table_is_refused(forged: Forgery):
     (forged.seed / "episodes.parquet").write_bytes(b"PAR1 nothing PAR1")
     assert "cannot be read as a table" in forged.checked().problems[0]
 
 
-def test_a_text_that_would_fill_the_memory_is_refused(forged: Forgery):
+def test_a_long_text_is_refused(forged: Forgery):
     forged.table(row(2, failure="x" * 5000))
     assert "has texts of more than 1000 characters in column 'failure'" in forged.checked().problems[0]

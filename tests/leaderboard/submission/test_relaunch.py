@@ -1,4 +1,4 @@
-"""Agents of submissions run again: from what their bundle brought, and from nothing else."""
+"""Agents of submissions run again from the files of their bundle alone."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dextron_bench.leaderboard.submission.entry import MANIFEST_KINDS
 from tests.helpers.forged_bundles import Forgery
 
 
-def test_an_agent_that_did_not_play_these_episodes_is_caught(forged: Forgery):
-    """Episodes of one agent, sent in with the code of another."""
+def test_an_agent_that_did_not_play_these_episodes_is_refused(forged: Forgery):
+    """The bundle has episodes of one agent and the code of another."""
     code = forged.folder / "agent" / "near.py"
     code.write_text(code.read_text().replace("1.0, -1.0", "0.9, -1.0"))
     assert forged.checked().sound
@@ -20,7 +20,7 @@ def test_an_agent_that_did_not_play_these_episodes_is_caught(forged: Forgery):
     assert "the agent, run again, acts differently" in problems[0]
 
 
-PARROT = """
+SEARCHER = """
 import glob
 
 
@@ -35,14 +35,14 @@ class Near:
 """
 
 
-def test_an_agent_that_is_run_again_finds_nothing_to_repeat(forged: Forgery):
-    """It ends with 70 and as many folders of episodes as it finds, or is stopped where it looks for them."""
-    (forged.folder / "agent" / "near.py").write_text(PARROT)
+def test_an_agent_that_runs_again_cannot_find_its_episodes(forged: Forgery):
+    """Its exit code is 70 plus the number of folders of episodes that it finds, unless the guard stops the search."""
+    (forged.folder / "agent" / "near.py").write_text(SEARCHER)
     problems = forged.checked(rerun=True).problems
     assert "it ended with code 70" in problems[0] or "agents may not" in problems[0]
 
 
-def test_an_agent_that_cannot_be_run_again_is_told(forged: Forgery):
+def test_a_bundle_without_the_agents_file_is_refused(forged: Forgery):
     (forged.folder / "agent" / "near.py").unlink()
     assert "the bundle lacks the agent's file near.py" in forged.checked(rerun=True).problems[0]
 
@@ -60,11 +60,11 @@ def test_an_agent_that_cannot_be_run_again_is_told(forged: Forgery):
         ("method", "unknown"),
     ],
 )
-def test_a_manifest_starts_nothing_but_what_its_bundle_brought(
+def test_a_manifest_starts_nothing_outside_its_bundle(
     kind: str, spec: str, forged: Forgery, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(playing, "IsolatedAgent", lambda *_: pytest.fail("an agent was started"))
-    forged.json("bundle.json", lambda told: told["agent"].update(kind=kind, spec=spec))
+    forged.json("bundle.json", lambda manifest: manifest["agent"].update(kind=kind, spec=spec))
     assert f"{spec!r} does not name an agent of kind {kind!r}" in forged.checked(rerun=True).problems[0]
 
 
@@ -79,17 +79,17 @@ def test_a_manifest_starts_nothing_but_what_its_bundle_brought(
         ("policy", "policy.onnx", ""),
     ],
 )
-def test_agents_of_each_kind_are_started_from_the_bundle(kind: str, spec: str, weights: str, tmp_path: Path):
+def test_agents_of_each_kind_start_from_the_bundle(kind: str, spec: str, weights: str, tmp_path: Path):
     for name in ("near.py", "policy.pt", "policy.onnx", "seed0.safetensors"):
         (tmp_path / name).touch()
-    told = {"kind": kind, "spec": spec, "settings": {}, "weights": weights}
-    how = relaunch.launch_of(told, tmp_path)
+    agent = {"kind": kind, "spec": spec, "settings": {}, "weights": weights}
+    launch = relaunch.launch_of(agent, tmp_path)
     inside = kind == "policy" or ".py:" in spec
-    assert (str(how.spec), how.command) == (f"{tmp_path}/{spec}" if inside else spec, ())
-    assert MANIFEST_KINDS[how.spec.kind] == kind
-    assert how.weights == (f"{tmp_path}/{weights}" if weights else "")
+    assert (str(launch.spec), launch.command) == (f"{tmp_path}/{spec}" if inside else spec, ())
+    assert MANIFEST_KINDS[launch.spec.kind] == kind
+    assert launch.weights == (f"{tmp_path}/{weights}" if weights else "")
 
 
-def test_weights_are_a_file_of_the_bundle(forged: Forgery):
-    forged.json("bundle.json", lambda told: told["agent"].update(weights="../bundle.json"))
+def test_weights_outside_the_bundle_are_refused(forged: Forgery):
+    forged.json("bundle.json", lambda manifest: manifest["agent"].update(weights="../bundle.json"))
     assert "the bundle lacks the agent's file ../bundle.json" in forged.checked(rerun=True).problems[0]

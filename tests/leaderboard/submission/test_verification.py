@@ -1,4 +1,4 @@
-"""Verification: what is sound is taken, and every way to cheat that we could think of is caught, and said."""
+"""Verification accepts valid submissions, and refuses every forgery of the documented attacks with a reason."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from tests.helpers import tiny_benchmark
 from tests.helpers.forged_bundles import Forgery, row
 
 
-def test_a_sound_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forged: Forgery):
-    """Of four episodes a seed one knocks the bottle over."""
+def test_a_valid_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forged: Forgery):
+    """One of the four episodes of each seed knocks the bottle over."""
     verdict = forged.checked(rerun=True)
     assert verdict.problems == []
     assert verdict.notes[-1] == "all seeds have the same episodes: they count as one, not as several trainings"
@@ -31,7 +31,7 @@ def test_a_sound_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forg
     assert verdict.results[0]["splits"]["test"]["scores"] == [20.0, 20.0, 0.0]
 
 
-def test_equal_submissions_are_equal_bytes_and_nothing_is_played_twice(submitted: Path, tmp_path: Path):
+def test_equal_submissions_have_equal_bytes_and_nothing_is_played_twice(submitted: Path, tmp_path: Path):
     entry = submission_entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0, 1))
 
     def forbidden(*_: object) -> None:
@@ -53,22 +53,22 @@ def test_episodes_are_played_in_an_order_that_depends_on_split_and_seed():
     assert list(playing.row_order(replace(split, digest="1" * 64), 0)) != list(first)
 
 
-def test_a_changed_reward_is_caught(forged: Forgery):
+def test_a_changed_reward_is_refused(forged: Forgery):
     forged.table(row(2, score=20.0, success=True, cause="solved"))
     forged.conclude()
     assert "says success True; played again it is False" in forged.checked().problems[0]
 
 
-def test_a_changed_action_is_caught(forged: Forgery):
-    told = pd.read_parquet(forged.seed / "episodes.parquet").query("split == 'test' and row == 0")
-    actions = np.array(told["actions"].iloc[0])
+def test_a_changed_action_is_refused(forged: Forgery):
+    rows = pd.read_parquet(forged.seed / "episodes.parquet").query("split == 'test' and row == 0")
+    actions = np.array(rows["actions"].iloc[0])
     actions[-1] = np.nextafter(actions[-1], 0.0)
     forged.table(row(0, actions=actions))
     forged.conclude()
     assert "its hash of states, actions and rewards differs" in "".join(forged.checked().problems)
 
 
-def test_actions_that_are_none_or_too_few_are_caught(forged: Forgery):
+def test_invalid_or_missing_actions_are_refused(forged: Forgery):
     forged.table(row(0, actions=np.array([2.0])))
     assert "row 0 has actions that are not" in forged.checked().problems[0]
     forged.table(row(0, actions=np.zeros(3), length=3))
@@ -76,24 +76,24 @@ def test_actions_that_are_none_or_too_few_are_caught(forged: Forgery):
     assert "played again it is" in "".join(forged.checked().problems)
 
 
-def test_a_changed_state_is_caught_though_the_recording_is_hashed_again(forged: Forgery):
+def test_a_changed_state_is_refused_although_the_hash_is_correct(forged: Forgery):
     file = forged.seed / "recordings" / "test-0000.rrd"
-    told = recording.read(file)
-    states = told.episode.states.copy()
+    recorded = recording.read(file)
+    states = recorded.episode.states.copy()
     states[5, 2] += 1e-9
     source = sources.open_source(tiny_benchmark.NAME)
-    changed = replace(told.episode, states=states)
-    recording.write(file, changed, source.path(changed.setting), told.properties)
+    changed = replace(recorded.episode, states=states)
+    recording.write(file, changed, source.path(changed.setting), recorded.properties)
     assert forged.checked().problems == [
         "seed0: recordings/test-0000.rrd does not hold the episode that its actions give"
     ]
 
 
-def test_a_recording_under_another_name_is_caught(forged: Forgery):
+def test_a_recording_under_another_name_is_refused(forged: Forgery):
     file = forged.seed / "recordings" / "test-0000.rrd"
-    told = recording.read(file)
-    path = sources.open_source(tiny_benchmark.NAME).path(told.episode.setting)
-    recording.write(file, told.episode, path, {**told.properties, "method": "other"})
+    recorded = recording.read(file)
+    path = sources.open_source(tiny_benchmark.NAME).path(recorded.episode.setting)
+    recording.write(file, recorded.episode, path, {**recorded.properties, "method": "other"})
     assert forged.checked().problems == ["seed0: recordings/test-0000.rrd says method other, not near"]
     file.rename(file.with_name("test-0001.rrd"))
     assert "test-0001.rrd does not hold the episode" in forged.checked().problems[0]
@@ -101,29 +101,29 @@ def test_a_recording_under_another_name_is_caught(forged: Forgery):
     assert "test-0900.rrd belongs to no row of the splits" in forged.checked().problems[0]
 
 
-def test_a_damaged_recording_is_caught(forged: Forgery):
+def test_a_damaged_recording_is_refused(forged: Forgery):
     file = forged.seed / "recordings" / "test-0000.rrd"
     file.write_bytes(file.read_bytes()[:-100])
     assert "test-0000.rrd" in forged.checked().problems[0]
 
 
-def test_a_changed_setting_is_caught(forged: Forgery):
+def test_a_changed_setting_is_refused(forged: Forgery):
     forged.table(row(2, offset_x=-0.015, offset_y=0.005))
     assert "test: row 2 has another setting than the split" in forged.checked().problems[0]
 
 
-def test_a_dropped_episode_is_caught(forged: Forgery):
+def test_a_dropped_episode_is_refused(forged: Forgery):
     forged.table(lambda table: table[table["score"] > 0])
     forged.conclude()
     assert "has 3 episodes, but the splits have 4" in forged.checked().problems[0]
 
 
-def test_a_good_episode_twice_in_place_of_a_bad_one_is_caught(forged: Forgery):
-    def twice(table: pd.DataFrame) -> pd.DataFrame:
+def test_a_good_episode_that_replaces_a_bad_one_is_refused(forged: Forgery):
+    def duplicate(table: pd.DataFrame) -> pd.DataFrame:
         good = table[(table["split"] == "test") & (table["row"] == 0)]
         return pd.concat([table[table["score"] > 0], good], ignore_index=True)
 
-    forged.table(twice)
+    forged.table(duplicate)
     forged.conclude()
     problems = forged.checked().problems
     assert "test: row 0 appears 2 times" in problems[0]
@@ -132,7 +132,7 @@ def test_a_good_episode_twice_in_place_of_a_bad_one_is_caught(forged: Forgery):
     assert "row 2 has another setting" in "".join(forged.checked().problems)
 
 
-def test_swapped_splits_are_caught(forged: Forgery):
+def test_swapped_splits_are_refused(forged: Forgery):
     names = {"test": "unseen-reach", "unseen-reach": "test"}
     forged.table(lambda table: table.assign(split=table["split"].map(names)))
     assert "was played on another version of the split" in forged.checked().problems[0]
@@ -140,7 +140,7 @@ def test_swapped_splits_are_caught(forged: Forgery):
     assert "train is not a split that ranks methods" in forged.checked().problems[0]
 
 
-def test_an_edited_result_is_caught(forged: Forgery):
+def test_an_edited_result_is_refused(forged: Forgery):
     def better(result: dict[str, Any]) -> None:
         result["splits"]["test"]["scores"][2] = 20.0
 
@@ -161,40 +161,40 @@ def test_a_tier_cannot_be_claimed(forged: Forgery):
     assert "tier" not in verdict.results[0]
 
 
-def test_another_agents_episodes_are_caught_unless_the_agent_itself_does_the_same(submitted: Path, forged: Forgery):
-    """A board that has the same episodes under another name."""
+def test_another_agents_episodes_are_refused_unless_the_agent_chooses_them(submitted: Path, forged: Forgery):
+    """The board has the same episodes under another name."""
     other = json.loads((submitted / "runs/submissions/near/synthetic/seed0/result.json").read_text()) | {
         "method": "first"
     }
-    place = forged.board / "results" / "first" / "synthetic" / "seed0"
-    place.mkdir(parents=True)
-    (place / "result.json").write_text(json.dumps(other))
+    folder = forged.board / "results" / "first" / "synthetic" / "seed0"
+    folder.mkdir(parents=True)
+    (folder / "result.json").write_text(json.dumps(other))
     line = "seed0: 3 of 3 episodes on test have exactly the actions of 'first', seed 0"
-    refused = forged.checked()
-    assert line in refused.problems
-    again = forged.checked(rerun=True)
-    assert again.problems == []
-    assert line in again.notes
+    replayed = forged.checked()
+    assert line in replayed.problems
+    rerun = forged.checked(rerun=True)
+    assert rerun.problems == []
+    assert line in rerun.notes
 
 
-def test_chosen_and_hidden_seeds_are_caught(forged: Forgery):
-    forged.json("bundle.json", lambda told: told.update(seeds=[1]))
+def test_chosen_and_hidden_seeds_are_refused(forged: Forgery):
+    forged.json("bundle.json", lambda manifest: manifest.update(seeds=[1]))
     problems = forged.checked().problems
     assert "has seeds [1]; they must be 0, 1, 2" in problems[0]
     assert "holds seed0, which is not among the seeds" in problems[1]
-    forged.json("bundle.json", lambda told: told.update(seeds=[0, 1, 2]))
+    forged.json("bundle.json", lambda manifest: manifest.update(seeds=[0, 1, 2]))
     assert "seed2: lacks episodes.parquet" in forged.checked().problems[0]
 
 
-def test_other_physics_is_told(forged: Forgery):
-    forged.json("bundle.json", lambda told: told.update(physics="0" * 64))
+def test_other_physics_are_refused(forged: Forgery):
+    forged.json("bundle.json", lambda manifest: manifest.update(physics="0" * 64))
     assert forged.checked().problems == [
         "was played with other physics than this version's; submit it again with this version"
     ]
 
 
-def test_a_machine_is_of_the_same_platform_as_itself(monkeypatch: pytest.MonkeyPatch):
-    """On a Mac the name of the system has two forms."""
+def test_a_machine_has_the_same_platform_as_itself(monkeypatch: pytest.MonkeyPatch):
+    """The name of macOS has two forms."""
     monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
     monkeypatch.setattr("platform.system", lambda: "Darwin")
     assert result_check.same_platform(provenance.collect(""))
@@ -204,9 +204,9 @@ def test_a_machine_is_of_the_same_platform_as_itself(monkeypatch: pytest.MonkeyP
     assert not result_check.same_platform(here)
 
 
-def test_another_platform_is_held_to_outcomes_and_says_so(forged: Forgery):
-    """A last bit differs everywhere; outcomes are those of the replay."""
-    forged.json("seed0/provenance.json", lambda told: told["machine"].update(cpu="another"))
+def test_on_another_platform_only_outcomes_must_agree(forged: Forgery):
+    """All episodes differ in the last bits; their outcomes equal the replay."""
+    forged.json("seed0/provenance.json", lambda content: content["machine"].update(cpu="another"))
     assert forged.checked().problems == ["seed0: its result has another provenance than its run"]
     forged.json("seed0/result.json", lambda result: result["provenance"]["machine"].update(cpu="another"))
     forged.table(lambda table: table.assign(trace="0" * 64))
@@ -218,10 +218,10 @@ def test_another_platform_is_held_to_outcomes_and_says_so(forged: Forgery):
 
 
 @pytest.mark.parametrize(
-    "told",
+    "changes",
     [{"machine": "x"}, {"git": ["a"]}, {"machine": {"system": "Linux", "cpu": "\ud800", "cores": 1}}, {"more": 1}],
 )
-def test_a_provenance_from_which_no_page_could_be_made_is_refused(told: dict[str, Any], forged: Forgery):
-    forged.json("seed0/provenance.json", lambda whole: whole.update(told))
-    forged.json("seed0/result.json", lambda result: result["provenance"].update(told))
+def test_a_provenance_that_would_break_the_page_is_refused(changes: dict[str, Any], forged: Forgery):
+    forged.json("seed0/provenance.json", lambda content: content.update(changes))
+    forged.json("seed0/result.json", lambda result: result["provenance"].update(changes))
     assert "in the result is invalid" in forged.checked().problems[0] or "text" in forged.checked().problems[0]
