@@ -1,4 +1,4 @@
-"""Each example runs, briefly."""
+"""Each example runs with few steps or episodes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The published leaderboard is what the package computes: its results, its tables, and the weights that ship."""
+"""The package reproduces the published leaderboard: results, tables, page and the weights that ship."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import atomic, tensors
-from dextron_bench.training import jobs
 
 BOARD = Path(__file__).parents[2] / "leaderboard"
 RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))
@@ -25,34 +24,34 @@ WEIGHTS = sorted((Path(baselines.__file__).parent / "weights").glob("*/*/seed*.s
 
 
 def name(file: Path) -> str:
-    """Method, source of reaches and seed of a file, as a folder of runs has them."""
+    """Method, source of reaches and seed of a file, as `<label>/<reaches>/seed<k>`."""
     return "/".join([*file.parts[-4:-1]] if file.name == "result.json" else [*file.parts[-3:-1], file.stem])
 
 
 @pytest.mark.parametrize("file", RESULTS, ids=name)
-def test_a_result_is_whole_and_of_the_splits_that_ship(file: Path):
+def test_a_result_is_complete_and_uses_the_splits_that_ship(file: Path):
     result = result_files.read_result(file)
     assert name(file) == f"{result['method']}/{result['reaches']}/seed{result['seed']}"
-    for wanted in ranking_splits(result["reaches"]):
-        split, found = load_split(result["reaches"], wanted), result["splits"][wanted]
-        assert found["digest"] == split.digest
-        assert len(found["scores"]) == sum(found["causes"].values()) == len(split.cases)
-        assert found["causes"].get("solved", 0) == found["scores"].count(20.0)
-        assert found["failed"] == 0
+    for split_name in ranking_splits(result["reaches"]):
+        split, published = load_split(result["reaches"], split_name), result["splits"][split_name]
+        assert published["digest"] == split.digest
+        assert len(published["scores"]) == sum(published["causes"].values()) == len(split.cases)
+        assert published["causes"].get("solved", 0) == published["scores"].count(20.0)
+        assert published["failed"] == 0
 
 
 def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
-    again = tmp_path / "board"
-    shutil.copytree(BOARD, again)
+    rebuilt = tmp_path / "board"
+    shutil.copytree(BOARD, rebuilt)
     (tmp_path / "recordings").symlink_to(BOARD.parent / "recordings")
-    assert main.main(["leaderboard", "build", "--into", str(again)]) == 0
-    for made in ("README.md", "table.csv", "table.json", "index.html"):
-        assert (again / made).read_text() == (BOARD / made).read_text()
-    assert {file.name for file in again.glob("*.png")} == {file.name for file in BOARD.glob("*.png")}
+    assert main.main(["leaderboard", "build", "--into", str(rebuilt)]) == 0
+    for file in ("README.md", "table.csv", "table.json", "index.html"):
+        assert (rebuilt / file).read_text() == (BOARD / file).read_text()
+    assert {file.name for file in rebuilt.glob("*.png")} == {file.name for file in BOARD.glob("*.png")}
 
 
 @pytest.mark.parametrize("file", WEIGHTS, ids=name)
-def test_weights_that_ship_are_those_of_the_result(file: Path):
+def test_weights_that_ship_made_the_published_result(file: Path):
     result = result_files.read_result(BOARD / "results" / name(file) / "result.json")
     assert result["training"].items() >= weights.metadata(file).items()
     points = atomic.read_json(BOARD / "results" / name(file) / "curve.json")["points"]
@@ -66,13 +65,13 @@ def test_weights_that_ship_are_those_of_the_result(file: Path):
         *(pytest.param(file, 50, id=f"{name(file)}-50", marks=pytest.mark.slow) for file in WEIGHTS),
     ],
 )
-def test_weights_that_ship_score_what_was_published(file: Path, rows: int, opened: Callable[[str], Source]):
-    """Bit for bit, so the sums of rewards are equal; `dextron-bench eval` does the same for every row."""
+def test_weights_that_ship_reproduce_the_published_scores(file: Path, rows: int, opened: Callable[[str], Source]):
+    """The episodes are equal bit for bit, so returns are equal; `dextron-bench eval` does the same for every row."""
     about, reaches = tensors.read_about(file), file.parent.name
     learner = registry.create(about["method"], about["settings"])
     assert isinstance(learner, Learner)
     split = load_split(reaches, "test")
     agent, source = weights.load_agent(learner, file), opened(reaches)
-    found = {index: each.score for index, each in rollout(agent, source, split.cases[:rows])}
+    scores = {row: episode.score for row, episode in rollout(agent, source, split.cases[:rows])}
     result = result_files.read_result(BOARD / "results" / name(file) / "result.json")
-    assert [found[row] for row in range(rows)] == result["splits"]["test"]["scores"][:rows]
+    assert [scores[row] for row in range(rows)] == result["splits"]["test"]["scores"][:rows]
