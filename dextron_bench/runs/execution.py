@@ -1,4 +1,7 @@
-"""Executes runs: trains the learner if there is one, evaluates on splits, records episodes, writes the result."""
+"""Executes runs: trains the learner if there is one, evaluates on splits, records episodes, writes the result.
+
+`evaluate` has more than 25 lines because of its seven parameters.
+"""
 
 from __future__ import annotations
 
@@ -99,10 +102,15 @@ def evaluate(
             if row < record and len(episode.actions):
                 recording_files.record(folder, source, split, row, episode, about)
             report(len(rows), len(split.cases))
-        others = [table[table["split"] != split.name]] if len(table) else []
-        table = pd.concat([*others, pd.DataFrame([rows[row] for row in sorted(rows)])], ignore_index=True)
+        table = _with_split(table, split.name, [rows[row] for row in sorted(rows)])
         run_files.store_episodes(folder, table)
     return table
+
+
+def _with_split(table: pd.DataFrame, split: str, rows: list[dict[str, Any]]) -> pd.DataFrame:
+    """The table with other rows of a split, at its end."""
+    others = [table[table["split"] != split]] if len(table) else []
+    return pd.concat([*others, pd.DataFrame(rows)], ignore_index=True)
 
 
 def _weights_file(run: Run, runs: Path) -> Path | None:

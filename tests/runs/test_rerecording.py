@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,6 @@ from dextron_bench.runs.rerecording import Unplayable
 from dextron_bench.runs.selection import EpisodeFilter
 from dextron_bench.storage import atomic
 from dextron_bench.storage.run_folder import RunFolder
-from tests.helpers import tiny_benchmark
 
 ALL = EpisodeFilter(worst=9)
 LATE = """
@@ -31,14 +29,6 @@ class Late:
         self.step += 1
         return np.full((len(states), 1), 0.5 if self.step <= 7 else 2.0)
 """
-
-
-@pytest.fixture(autouse=True)
-def world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Tiny splits of short reaches."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    yield
-    tiny_benchmark.forget()
 
 
 def play(folder: Path, record: int = 0, method: str = "exp") -> Path:
