@@ -111,7 +111,7 @@ class Add:
             add.check_name(manifest["name"], manifest["reaches"], self.board, self.replace)
             verdict = _verify(opened, self.board, self.rerun, self.threads, self.quiet)
             code = print_verdict(verdict)
-            if verdict.sound:
+            if verdict.passed:
                 print(*add.merge(verdict, self.board), sep="\n")
         return code
 
@@ -137,7 +137,7 @@ def print_verdict(verdict: Verdict) -> int:
     name = f"{verdict.manifest['name']} on {verdict.manifest['reaches']} reaches"
     for note in verdict.notes:
         print(f"note: {note}")
-    if verdict.sound:
+    if verdict.passed:
         print(f"{name}: {verdict.tier}; {verdict.exact} of {verdict.episodes} episodes equal bit for bit")
         return DONE
     print(f"{name}: refused", *verdict.problems, sep="\n  ")

@@ -31,7 +31,7 @@ def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:
 
 
 def merge(verdict: Verdict, board: Path) -> list[Path]:
-    """Puts a sound submission on the board and builds its tables and page; returns the files that were built.
+    """Puts a verified submission on the board and builds its tables and page; returns the files that were built.
 
     A copy of the board is built first: if a submission breaks the page, the board stays as it was.
     """

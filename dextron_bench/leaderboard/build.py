@@ -36,9 +36,7 @@ def build(board: Path) -> list[Path]:
     files = [board / "table.csv", board / "README.md", board / "table.json"]
     atomic.write_atomically(files[0], lambda part: table.to_csv(part, index=False, float_format="%.6g"))
     atomic.write_atomically(files[2], lambda part: table.to_json(part, orient="records", indent=1))
-    curves: dict[str, dict[str, Curves]] = defaultdict(dict)
-    for (method, reaches), by_seed in learning_curves(board / RESULTS).items():
-        curves[reaches][method] = by_seed
+    curves = _curves_by_source(board / RESULTS)
     readme.insert(files[1], "\n".join(readme.sections(table, set(curves))))
     for reaches, by_method in curves.items():
         files.append(board / readme.picture(reaches))
@@ -55,6 +53,14 @@ def _with_origin(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.Da
 
     ranked_entries = [entry for entry in entries(rows, results) if entry.tier != QUOTED]
     return rows.assign(**{name: [getattr(entry, name) for entry in ranked_entries] for name in ORIGIN})
+
+
+def _curves_by_source(runs: Path) -> dict[str, dict[str, Curves]]:
+    """The learning curves of runs, by source of reaches and then by method."""
+    curves: dict[str, dict[str, Curves]] = defaultdict(dict)
+    for (method, reaches), by_seed in learning_curves(runs).items():
+        curves[reaches][method] = by_seed
+    return curves
 
 
 def learning_curves(runs: Path, cloned: bool = False) -> dict[tuple[str, str], Curves]:

@@ -68,12 +68,12 @@ def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]
 
 
 def _ship_weights(run: RunFolder, result: dict[str, Any]) -> None:
-    """Copies an installed learner's weights to where `eval` finds them; weights of a method in a file stay there."""
+    """Copies the weights of an installed learner to the folder of shipped weights; skips methods in a file."""
     config = atomic.read_json(run.config)
     if config["code"]["sha256"]:
         return
     method = registry.create(config["code"]["class"], config["settings"])
-    if isinstance(method, Learner):  # A method that takes the policy of another has no weights of its own.
+    if isinstance(method, Learner):  # A policy transfer has no weights of its own.
         _copy(run.weights, weights.shipped_folder(method, result["reaches"]) / f"seed{result['seed']}.safetensors")
 
 

@@ -75,7 +75,7 @@ def stamp(row: Row, finding: Finding) -> bool:
 
 
 def differing_files(board: Path) -> list[str]:
-    """Built files of the board that differ from what its results give, a line each."""
+    """A line for each built file of the board that differs from a new build of its results."""
     with TemporaryDirectory() as folder:
         copy = Path(folder) / "board"
         shutil.copytree(board, copy)

@@ -12,7 +12,7 @@ MANY = 0.5  # A larger share of equal episodes makes a seed a copy.
 
 
 def copied_seeds(results: Mapping[int, dict[str, Any]], name: str, board: Path) -> Iterator[str]:
-    """A line for each seed and split of `results` with mostly the episodes of a method of another name on the board."""
+    """A line for each seed and split whose episodes mostly equal the episodes of another method on the board."""
     for other in result_files.results(board / "results"):
         if other["method"] == name:
             continue

@@ -24,12 +24,7 @@ from dextron_bench.storage.run_folder import RunFolder
 
 
 def play_entry(
-    entry: Entry,
-    runs: Path,
-    record: int,
-    limits: Limits,
-    threads: int = 0,
-    report: Progress = no_progress,
+    entry: Entry, runs: Path, record: int, limits: Limits, threads: int = 0, report: Progress = no_progress
 ) -> Path:
     """Plays the episodes of an entry that the folder of runs lacks; returns the folder of the entry's seeds.
 

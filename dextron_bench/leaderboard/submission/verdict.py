@@ -1,4 +1,4 @@
-"""What verification finds: for each seed of a submission, and for the whole submission."""
+"""The findings of verification, for each seed of a submission and for the whole submission."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Verdict:
     tables: dict[int, pd.DataFrame] = field(default_factory=dict)  # Episodes as they were played again.
 
     @property
-    def sound(self) -> bool:
-        """True if nothing refuses the submission."""
+    def passed(self) -> bool:
+        """True if verification found no problem."""
         return not self.problems
 
     def add(self, finding: SeedFinding) -> None:

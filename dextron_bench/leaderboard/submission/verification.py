@@ -1,4 +1,7 @@
-"""Verifies a submission: every claim must follow from its actions when they are played again."""
+"""Verifies a submission: every claim must follow from its actions when they are played again.
+
+`verify` has more than 25 lines because it lists all checks in their order.
+"""
 
 from __future__ import annotations
 
@@ -43,14 +46,19 @@ def verify(
         verdict.add(seed.check(threads, report))
     if extra := sorted({run.seed for run in seed_folders(folder)} - set(numbers)):
         verdict.problems.append(f"holds seed{extra[0]}, which is not among the seeds that its manifest lists")
-    if rerun and verdict.sound:
+    if rerun and verdict.passed:
         _rerun(folder, seeds, verdict, limits or Limits(), threads, report)
+    _check_copies(verdict, board, rerun)
+    return verdict
+
+
+def _check_copies(verdict: Verdict, board: Path | None, rerun: bool) -> None:
+    """Adds a note if all seeds are equal, and a problem for copied episodes; only a note if the agent ran again."""
     if len(verdict.results) > 1 and duplicates.all_equal(verdict.results):
         verdict.notes.append("all seeds have the same episodes: they count as one, not as several trainings")
-    if board is not None and verdict.sound:
-        copies = list(duplicates.copied_seeds(verdict.results, manifest["name"], board))
+    if board is not None and verdict.passed:
+        copies = list(duplicates.copied_seeds(verdict.results, verdict.manifest["name"], board))
         (verdict.notes if rerun else verdict.problems).extend(copies)
-    return verdict
 
 
 def _rerun(
@@ -61,6 +69,6 @@ def _rerun(
         shutil.rmtree(run.path)
     for seed in seeds:
         verdict.add(seed.rerun(limits, threads, report))
-    verdict.tier = "re-run" if verdict.sound else "replayed"
+    verdict.tier = "re-run" if verdict.passed else "replayed"
     if not sandbox.is_available():
         verdict.notes.append("bubblewrap is not installed: the agent ran with your rights, watched by a hook alone")

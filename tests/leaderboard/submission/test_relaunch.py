@@ -15,7 +15,7 @@ def test_an_agent_that_did_not_play_these_episodes_is_refused(forged: Forgery):
     """The bundle has episodes of one agent and the code of another."""
     code = forged.folder / "agent" / "near.py"
     code.write_text(code.read_text().replace("1.0, -1.0", "0.9, -1.0"))
-    assert forged.checked().sound
+    assert forged.checked().passed
     problems = forged.checked(rerun=True).problems
     assert "the agent, run again, acts differently" in problems[0]
 

@@ -1,0 +1,59 @@
+"""Results of a submission must equal the result of its episodes; on another platform, their outcomes must agree."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dextron_bench.leaderboard.submission import result_check
+from dextron_bench.storage import provenance
+from tests.helpers.forged_bundles import Forgery, row
+
+
+def test_an_edited_result_is_refused(forged: Forgery):
+    def better(result: dict[str, Any]) -> None:
+        result["splits"]["test"]["scores"][2] = 20.0
+
+    forged.json("seed0/result.json", better)
+    assert forged.checked().problems == [
+        "seed0: its result has scores on test that its episodes do not give (row 2: 20.0, not 0.0)"
+    ]
+    forged.json("seed0/result.json", lambda result: result.update(seed=7))
+    assert "its result says seed 7, not 0" in forged.checked().problems[0]
+    forged.json("seed0/result.json", lambda result: result.update(rank=1))
+    assert "'rank' was unexpected" in forged.checked().problems[0]
+
+
+def test_a_machine_has_the_same_platform_as_itself(monkeypatch: pytest.MonkeyPatch):
+    """The name of macOS has two forms."""
+    monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
+    monkeypatch.setattr("platform.system", lambda: "Darwin")
+    assert result_check.same_platform(provenance.collect(""))
+    monkeypatch.setattr("platform.platform", lambda *_: "Linux-6.1-x86_64")
+    here = provenance.collect("")
+    monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")
+    assert not result_check.same_platform(here)
+
+
+def test_on_another_platform_only_outcomes_must_agree(forged: Forgery):
+    """All episodes differ in the last bits; their outcomes equal the replay."""
+    forged.json("seed0/provenance.json", lambda content: content["machine"].update(cpu="another"))
+    assert forged.checked().problems == ["seed0: its result has another provenance than its run"]
+    forged.json("seed0/result.json", lambda result: result["provenance"]["machine"].update(cpu="another"))
+    forged.table(lambda table: table.assign(trace="0" * 64))
+    verdict = forged.checked()
+    assert verdict.problems == []
+    assert "made on another platform; of 4 episodes 0 are equal bit for bit, 4 end alike" in verdict.notes[0]
+    forged.table(row(2, score=20.0, success=True))
+    assert "says success True" in "".join(forged.checked().problems)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"machine": "x"}, {"git": ["a"]}, {"machine": {"system": "Linux", "cpu": "\ud800", "cores": 1}}, {"more": 1}],
+)
+def test_a_provenance_that_would_break_the_page_is_refused(changes: dict[str, Any], forged: Forgery):
+    forged.json("seed0/provenance.json", lambda content: content.update(changes))
+    forged.json("seed0/result.json", lambda result: result["provenance"].update(changes))
+    assert "in the result is invalid" in forged.checked().problems[0] or "text" in forged.checked().problems[0]
