@@ -18,10 +18,7 @@ DOCUMENTS = (
     *("README.md", "CONTRIBUTING.md", "leaderboard/README.md", "recordings/README.md", "docs/**/*.md"),
     *("dextron_bench/**/*.html", "dextron_bench/**/*.js"),
 )
-TO_DO: tuple[str, ...] = (  # Folders and files that are not rewritten yet.
-    "tests/leaderboard",
-    "tests/shipped",
-)
+TO_DO: tuple[str, ...] = ()  # Folders and files that are not rewritten yet.
 
 # Each pattern with a plain replacement.
 BANNED = {
