@@ -13,12 +13,12 @@ from dextron_bench.storage.run_folder import RunFolder
 
 
 class RecordingCheck:
-    """The recordings of one seed; `problems` lists what is wrong with those that were checked."""
+    """The recordings of one seed; `problems` lists the faults of the recordings that were checked."""
 
     def __init__(
         self, run: RunFolder, claims: Mapping[str, Any], accepted: Mapping[tuple[str, int], str], report: Progress
     ) -> None:
-        """Reads what the recordings of a run say of themselves.
+        """Reads the properties of the recordings of a run.
 
         `claims` are method, source of reaches and seed. `accepted` are further hashes of episodes, by split and row,
         that a recording may have.
@@ -42,11 +42,11 @@ class RecordingCheck:
         if fingerprint(recorded.episode) not in hashes or recorded.episode.setting != episode.setting:
             self.problems.append(f"recordings/{name} does not hold the episode that its actions give")
         expected = {**self._claims, "split": split, "row": row}
-        if other := [key for key, value in expected.items() if recorded.properties.get(key) != value]:
-            key = other[0]
+        if differing := [key for key, value in expected.items() if recorded.properties.get(key) != value]:
+            key = differing[0]
             self.problems.append(f"recordings/{name} says {key} {recorded.properties.get(key)}, not {expected[key]}")
 
-    def strays(self, rows: Iterable[tuple[str, int]]) -> list[str]:
+    def without_row(self, rows: Iterable[tuple[str, int]]) -> list[str]:
         """Names of recordings that belong to none of these rows, sorted by split and row."""
         return [self._summaries[place].file.name for place in sorted(self._summaries.keys() - set(rows))]
 

@@ -16,8 +16,8 @@ from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage.progress import Progress, no_progress
 
-TOLERANCE = 1e-3  # How far a number of the last state may be off on another platform.
-AGREEING = 0.99  # The share of episodes that must end alike there.
+TOLERANCE = 1e-3  # Largest difference of a number in the last state on another platform.
+AGREEING = 0.99  # Share of episodes that must end alike on another platform.
 EXACT = ("length", "terminated", "truncated", "success", "score", "cause", "closing_lag", "trace")
 WORDS = {
     "length": "number of steps", "score": "return", "cause": "cause of failure", "closing_lag": "closing lag",
@@ -29,7 +29,7 @@ Observe = Callable[[str, int, Episode], None]  # Receives (split, row, episode) 
 
 @dataclass(slots=True)
 class Replayed:
-    """The rows as they are when played again, and how they differ from the table's."""
+    """The rows computed from the replay, and how they differ from the rows of the table."""
 
     rows: pd.DataFrame
     episodes: int = 0
@@ -46,18 +46,18 @@ def replay_table(
     report: Progress = no_progress,
     observe: Observe = lambda split, row, episode: None,
 ) -> Replayed:
-    """Plays a whole table again; its rows are rows of the splits (see `episode_tables.faults`)."""
+    """Plays all rows of a table again; they must be rows of the splits (see `episode_tables.faults`)."""
     rows, replayed = [], Replayed(pd.DataFrame())
     for split, row, claimed, episode in _played(source, splits, table, threads):
         observe(split.name, row, episode)
         computed = episode_table.row(split, row, episode)
         rows.append(computed)
         replayed.episodes += 1
-        other = [name for name in EXACT if not _equal(computed[name], claimed[name])]
-        replayed.exact += not other
+        differing = [name for name in EXACT if not _equal(computed[name], claimed[name])]
+        replayed.exact += not differing
         replayed.alike += _alike(computed, claimed)
-        if other:
-            replayed.differing.append(f"{split.name} row {row}: {_difference(other[0], claimed, computed)}")
+        if differing:
+            replayed.differing.append(f"{split.name} row {row}: {_difference(differing[0], claimed, computed)}")
         report(replayed.episodes, len(table))
     replayed.rows = pd.DataFrame(rows).sort_values(["split", "row"], ignore_index=True)
     return replayed
@@ -66,13 +66,13 @@ def replay_table(
 def _played(
     source: Source, splits: Sequence[Split], table: pd.DataFrame, threads: int
 ) -> Iterator[tuple[Split, int, dict[str, Any], Episode]]:
-    """Each split and row with the claims of the table and the episode as it was played again."""
+    """For each row: its split, its number, the claims of the table, and the episode of the replay."""
     for split in splits:
         rows = table[table["split"] == split.name].sort_values("row").to_dict("records")
         settings = [split.cases[row["row"]].setting for row in rows]
         for place, episode in replay(source, settings, [np.asarray(row["actions"], float) for row in rows], threads):
             claimed = {str(name): value for name, value in rows[place].items()}
-            if claimed["failure"] and episode.failure:  # Its agent failed where its actions end.
+            if claimed["failure"] and episode.failure:  # The agent failed at the end of its actions.
                 episode = replace(episode, failure=claimed["failure"])
             yield split, claimed["row"], claimed, episode
 

@@ -29,7 +29,7 @@ class SeedCheck:
     def __init__(self, folder: Path, manifest: Mapping[str, Any], seed: int, splits: Sequence[Split]) -> None:
         self._run, self._agent_files = RunFolder.of_seed(folder, seed), folder / "agent"
         self._manifest, self._seed, self._splits = manifest, seed, splits
-        self._traces: dict[tuple[str, int], str] = {}  # Of the episodes as they were played again.
+        self._traces: dict[tuple[str, int], str] = {}  # The hash of each replayed episode.
 
     def check(self, threads: int, report: Progress) -> SeedFinding:
         """Checks rows, replays their actions, and compares result and recordings with the replay."""
@@ -51,7 +51,7 @@ class SeedCheck:
         finding.result = self._result(replayed.rows, result["provenance"])
         finding.add(*self._provenance_faults(result))
         self._compare(finding, replayed, result, lenient)
-        for name in recordings.strays(self._traces):
+        for name in recordings.without_row(self._traces):
             finding.add(f"recordings/{name} belongs to no row of the splits")
         return finding
 
