@@ -214,7 +214,9 @@ def test_weights_that_ship_lie_beside_the_method(
         place.write_bytes((here / f"runs/toy-0.1/synthetic/seed{seed}/weights.safetensors").read_bytes())
     assert rows(capsys, *words) == trained
     assert "ship for seed 1; train them" in complaint(*words, "--seed", "0", "1")
-    assert "--rate 0.2 --reaches synthetic --seed 0`, or use weights that ship: toy-0.1" in complaint(*words, "--rate", "0.2")
+    assert "--rate 0.2 --reaches synthetic --seed 0`, or use weights that ship: toy-0.1" in complaint(
+        *words, "--rate", "0.2"
+    )
 
 
 def damaged(folder: Path, kind: str) -> Path:

@@ -26,7 +26,7 @@ DESCRIPTIONS = {
     "lines at their return on test.",
     "How episodes end": "Each episode has one cause. The closing lag is the time from the expert's closing to the "
     "method's; a negative lag means that the hand closed too early.",
-    "Success by subject and start region": "Success in per cent, mean over seeds, by the subject who reached and by the "
+    "Success by subject and start region": "Success in per cent, mean over seeds, by the subject and by the "
     "start of the hand. Rings 0 to 3 go from near to far, angles 0 to 3 go around the bottle from -x to -y. "
     "A dash means that no setting starts there.",
     "Predictions of the success model": "Each curve is the predicted chance of success of every action; later steps "
