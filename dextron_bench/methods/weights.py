@@ -14,7 +14,6 @@ from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 
-FILE = "weights.safetensors"  # In a run's folder.
 METADATA = ("label", "reaches", "seeds", "epochs", "best_epoch", "frames")  # What a result copies from its weights.
 
 

@@ -85,9 +85,7 @@ def _estimates(method: str, returns: np.ndarray, settings: np.ndarray, regions: 
     """Return, success and interquartile mean of a method with their intervals; the latter only with `regions`."""
     solved = np.equal(returns, task.SUCCESS).astype(float)
     estimates = {
-        name: statistics.interval(
-            float(values.mean()), statistics.resampled_means(values, settings, _method_rng(method))
-        )
+        name: statistics.estimate(values, _method_rng(method), settings)
         for name, values in (("return", returns), ("success", solved))
     }
     if regions is not None:

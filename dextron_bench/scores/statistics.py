@@ -25,12 +25,15 @@ class Estimate:
     high: float
 
 
-def estimate(scores: np.ndarray, rng: np.random.Generator) -> Estimate:
+def estimate(scores: np.ndarray, rng: np.random.Generator, settings: np.ndarray | None = None) -> Estimate:
     """Mean of scores (seeds, settings) with the percentile interval of a two-level bootstrap.
 
-    Each resample draws settings with replacement, the same for every seed, and then seeds with replacement.
+    Each resample draws settings with replacement, the same for every seed, and then seeds with replacement. `settings`
+    (RESAMPLES, settings) counts the draws of each setting; without it they are drawn here.
     """
-    return interval(float(scores.mean()), resampled_means(scores, draw_counts(scores.shape[1], rng), rng))
+    if settings is None:
+        settings = draw_counts(scores.shape[1], rng)
+    return interval(float(scores.mean()), resampled_means(scores, settings, rng))
 
 
 def draw_counts(size: int, rng: np.random.Generator) -> np.ndarray:
