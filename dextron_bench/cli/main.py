@@ -22,8 +22,9 @@ BLAS = "OPENBLAS_NUM_THREADS"  # NumPy's products are small here, so more thread
 PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
 DESCRIPTION = """Grasping with a prosthetic hand that a person moves: a benchmark.
 
-Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or input, 3 the agent raised errors
-in some episodes, 70 an unexpected error, 130 interrupted. With --debug, or if DEXTRON_DEBUG is set, an error shows its traceback."""
+Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or input, 3 the agent raised errors in some
+episodes, 70 an unexpected error, 130 interrupted. With --debug, or if DEXTRON_DEBUG is set, an error shows its
+traceback."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
