@@ -16,11 +16,14 @@ class Agent(Protocol):
     """Acts in N episodes at once; it may keep memory for each episode."""
 
     def reset(self, episodes: np.ndarray) -> None:
-        """Announces that rows `episodes` (n,) of the next states begin a new episode."""
+        """Announces that rows `episodes` (n,) of the next states begin a new episode; called before that `act`."""
         ...
 
     def act(self, states: np.ndarray) -> np.ndarray:
-        """Maps states (N, 48) to closing speeds (N, 1) in [-1, 1]; N is the same in every call."""
+        """Maps states (N, 48) to closing speeds (N, 1), floats in [-1, 1]; N is the same in every call.
+
+        NaN, or a speed outside [-1, 1], fails the episode of its row. Another shape or type ends the evaluation.
+        """
         ...
 
 

@@ -5,7 +5,7 @@ curve and picks the best checkpoint. A learner owns its networks and its experie
 
 1. Write a frozen dataclass with the members of `Learner`; its fields are the settings and the flags of `run`.
 2. Return from `trainer` an object with the members of `Trainer`. It trains all given seeds together.
-3. Return from `policy` an agent that acts by the weights of one seed (`dextron_bench.methods.agents.Agent`).
+3. Return from `policy` an agent that acts with the weights of one seed (`dextron_bench.methods.agents.Agent`).
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class Trainer(Protocol):
     """Trains one agent for each of S seeds, all S together; lists have one element per seed, in the order of the seeds.
 
     Resuming must be exact to the bit: a new trainer that receives another trainer's `state` and all its `journal`s in
-    `restore` must continue as the other would have. The harness calls every method below `advance` between epochs only.
+    `restore` must continue as the other would have. Between epochs only, the harness calls `weights`, `state`, `journal`
+    and `restore`.
     """
 
     epoch: int  # Number of finished epochs.
@@ -79,6 +80,11 @@ class Trainer(Protocol):
 @runtime_checkable
 class Learner(Protocol):
     """A method that trains: a frozen dataclass whose fields are its settings, each with a default.
+
+    `trainer` returns an object with the members of `Trainer`, which trains all given seeds together. `policy` returns
+    the agent that acts with the weights of one seed. The fields of the dataclass are also flags of `run`. A method
+    `demonstrations(episodes)` is optional: it returns how many expert episodes the training uses if `train` has
+    `episodes` cases.
 
     `name` names the method, such as "rlil". `train_source` names the source of reaches on which the method is always
     trained and evaluated, such as "minjerk" for SIM; if it is empty, the run chooses the source.
@@ -115,7 +121,7 @@ class Learner(Protocol):
         ...
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> Agent:
-        """The deterministic agent that acts by one seed's weights, an element of `Trainer.weights`."""
+        """The deterministic agent that acts with one seed's weights, an element of `Trainer.weights`."""
         ...
 
 
