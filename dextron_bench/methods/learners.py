@@ -46,8 +46,8 @@ class Trainer(Protocol):
     """Trains one agent for each of S seeds, all S together; lists have one element per seed, in the order of the seeds.
 
     Resuming must be exact to the bit: a new trainer that receives another trainer's `state` and all its `journal`s in
-    `restore` must continue as the other would have. Between epochs only, the harness calls `weights`, `state`, `journal`
-    and `restore`.
+    `restore` must continue as the other would have. Between epochs only, the harness calls `weights`, `state`,
+    `journal` and `restore`.
     """
 
     epoch: int  # Number of finished epochs.

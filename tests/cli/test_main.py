@@ -1,4 +1,7 @@
-"""The command line from end to end: each error is one line and an exit code, and results are machine-readable."""
+"""The command line from end to end: each error is one line and an exit code, and results are machine-readable.
+
+Long, because every kind of error is tried once through the whole command line.
+"""
 
 from __future__ import annotations
 

@@ -1,10 +1,12 @@
-"""Methods with training, from the command line: flags, files, weights, and one line for each error."""
+"""Methods with training, from the command line: flags, files, weights, and one line for each error.
+
+Long, because `run` and `eval` are tried on the same trained toys.
+"""
 
 from __future__ import annotations
 
 import json
 import pickle
-import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,7 +18,6 @@ import pytest
 from safetensors.numpy import save_file
 
 from dextron_bench.cli import main
-from dextron_bench.cli.method_flags import one_line
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 from tests.helpers import tiny_benchmark, tiny_training, toy_learner
@@ -144,24 +145,6 @@ def test_an_error_is_one_line(
     monkeypatch.setitem(sys.modules, "torch", absent)
     assert expected in complaint(*run(TOY), *words)
     assert not list(here.rglob("result.json"))
-
-
-BOX = """╭─ Value error ────────╮
-│ Error parsing --rate: │
-│ not a float: 'x'.     │
-│ ───────────────────── │
-│ Argument helptext:    │
-│     --rate FLOAT      │
-│ ───────────────────── │
-│ For full helptext, see│
-╰──────────────────────╯
-"""
-ASCII = re.sub("[╭╰╮╯]", " ", BOX).replace("│", " ").replace("─", "-").replace("- Value error --", "Value error\n --")
-
-
-@pytest.mark.parametrize("box", [BOX, ASCII])
-def test_a_box_becomes_one_line(box: str):
-    assert one_line(box) == "Error parsing --rate: not a float: 'x'"
 
 
 ODD = """

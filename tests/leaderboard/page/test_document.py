@@ -1,4 +1,7 @@
-"""The leaderboard's page in a browser: it shows the numbers of the table, for any names of methods."""
+"""The leaderboard's page in a browser: it shows the numbers of the table, for any names of methods.
+
+Long, because one browser and one table serve all tests of the page.
+"""
 
 from __future__ import annotations
 

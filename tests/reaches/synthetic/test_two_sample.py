@@ -1,4 +1,7 @@
-"""The two-sample test: an AUC of 0.5 for equal samples, more for others, and models without the held-out reaches."""
+"""The two-sample test: an AUC of 0.5 for equal samples, more for others, and models without the held-out reaches.
+
+Long, because the reaches and classifiers of the study are shared by all its tests.
+"""
 
 from __future__ import annotations
 
