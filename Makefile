@@ -51,5 +51,4 @@ bench: $(ENVIRONMENT)
 
 # The documentation site, in site/. To read it: python3 -m http.server -d site
 docs: $(ENVIRONMENT)
-	$(PYTHON) -c 'import material, mkdocstrings_handlers.python' 2>/dev/null || $(PYTHON) -m pip install --quiet -c constraints.txt -e '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
