@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class View:
-    """Open recordings in the Rerun viewer, all together; no network is needed.
+    """Open recordings together in one window of the Rerun viewer; no network is needed.
 
     By default the command opens all recordings at the given places. The options --worst to --row select episodes of
     the runs at these places instead; without --worst or --best, the first five. Episodes without a recording are
@@ -71,7 +71,7 @@ class View:
     runs: Path = Path("runs")
     """Folder of all runs."""
     print: bool = False
-    """Print the names of the files, one in each line, instead of opening them; needs no screen."""
+    """Print the names of the files, one in each line, instead of opening them; works without a display."""
     quiet: bool = False
     """Show no progress."""
 
@@ -158,9 +158,7 @@ class View:
         if not self.print:
             _print_episodes(table)
         if len(table) < matching and episode_filter.worst is None and episode_filter.best is None:
-            line = (
-                f"{matching} episodes pass the filter; these are the first {len(table)}, --worst {matching} selects all"
-            )
+            line = f"{matching} episodes match; these are the first {len(table)}, --worst {matching} selects all"
             print(f"dextron-bench: {line}", file=sys.stderr)
         return files
 

@@ -100,7 +100,7 @@ def select(table: pd.DataFrame, episode_filter: EpisodeFilter) -> tuple[pd.DataF
     played = passing[passing["length"] > 0]
     if played.empty:
         unplayed = "; the agent failed before their first step" if len(passing) else ""
-        raise NoEpisodes(f"{len(passing)} of {len(table)} episodes pass the filter{unplayed}")
+        raise NoEpisodes(f"{len(passing)} of {len(table)} episodes match the filter{unplayed}")
     if episode_filter.worst is None and episode_filter.best is None:
         return played.head(LIMIT), len(played)
     worst = played.sort_values("score", kind="stable").head(episode_filter.worst or 0)

@@ -14,7 +14,7 @@ RUN_ADVICE = "remove it, or choose another folder with --runs"
 
 
 class FolderMismatch(ValueError):
-    """A folder that holds another config than the given one."""
+    """A folder that holds a different config from the given one."""
 
 
 def check(folder: Path, config: Mapping[str, Any]) -> None:

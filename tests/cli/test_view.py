@@ -102,7 +102,7 @@ def test_a_line_explains_how_to_select_all_matching_episodes(
 
     monkeypatch.setattr(selection, "LIMIT", 1)
     assert main.main(["view", "--split", "test"]) == 0
-    assert "4 episodes pass the filter; these are the first 1, --worst 4 selects all" in capsys.readouterr().err
+    assert "4 episodes match; these are the first 1, --worst 4 selects all" in capsys.readouterr().err
     assert len(opened) == 1
 
 
@@ -113,7 +113,7 @@ def test_an_error_is_one_line(here: Path, opened: list[str], complaint: Callable
     assert "no runs at data to select episodes from" in complaint("view", "data", "--failed")
     assert "choose from exp, nothing" in complaint("view", "--method", "bc")
     assert "select 1 episode or more" in complaint("view", "--worst", "0")
-    assert "0 of 4 episodes pass the filter" in complaint("view", "--failed", "--method", "exp")
+    assert "0 of 4 episodes match the filter" in complaint("view", "--failed", "--method", "exp")
     file = "runs/exp/synthetic/seed0/recordings/test-0000.rrd"
     assert "is a file, and episodes are selected from runs" in complaint("view", file, "--worst", "1")
     table = here / NOTHING / "episodes.parquet"

@@ -56,8 +56,8 @@ def test_a_filter_selects_these_episodes(settings: dict[str, Any], rows: list[in
         ({"seed": (7,)}, "no episode has seed 7; choose from 0, 1"),
         ({"row": (3,)}, "no episode has row 3; choose from 0 to 2"),
         ({"cause": ("late",)}, "no episode has cause 'late'; choose from solved, too early, too late, knocked over, "),
-        ({"cause": ("knocked over",)}, "0 of 7 episodes pass the filter"),
-        ({"cause": ("agent failed",)}, "1 of 7 episodes pass the filter; the agent failed before their first step"),
+        ({"cause": ("knocked over",)}, "0 of 7 episodes match the filter"),
+        ({"cause": ("agent failed",)}, "1 of 7 episodes match the filter; the agent failed before their first step"),
     ],
 )
 def test_an_unknown_value_is_answered_with_the_valid_ones(settings: dict[str, Any], message: str):

@@ -23,7 +23,7 @@ CROWD, TIMED_CALLS = 256, 20  # Episodes at once and calls of act(), to measure 
 SLOW = 5.0  # [ms] for a step of one episode; the physics takes about 0.3.
 
 OK, MEND, NOTE = "ok", "mend", "note"
-FORM = "actions are finite, in [-1, 1], one a row"
+FORM = "actions are finite, in [-1, 1], one per row"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ def _independence_check(launch: Launch, episodes: Sequence[Episode], limits: Lim
 
 def _cost_checks(launch: Launch, episodes: Sequence[Episode], limits: Limits) -> Iterator[Check]:
     """The duration of a step when many episodes are played at once, and the memory that this needs."""
-    what = "it is quick enough"
+    what = "it is fast enough"
     states = np.resize(np.concatenate([episode.states for episode in episodes]), (CROWD, model.STATE))
     with IsolatedAgent(launch, 0, limits) as agent:
         agent.reset(np.arange(CROWD))

@@ -54,7 +54,7 @@ def faults(table: pd.DataFrame, splits: Sequence[Split]) -> Iterator[str]:
 def _faults(rows: pd.DataFrame, split: Split) -> Iterator[str]:
     """The faults of the rows of one split."""
     if set(rows["digest"]) - {split.digest}:
-        yield f"was played on another version of the split than {split.digest[:8]}"
+        yield f"was played on another version of the split, not on {split.digest[:8]}"
     counts = rows["row"].value_counts()
     if duplicates := sorted(counts[counts > 1].index):
         yield f"row {duplicates[0]} appears {counts[duplicates[0]]} times"
