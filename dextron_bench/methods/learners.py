@@ -1,7 +1,7 @@
 """The contract between the harness and a method that trains: what a learner offers, and what it receives.
 
 The harness (`dextron_bench/training`) runs the epochs, writes files, resumes a killed training, makes the learning
-curve and picks the best checkpoint. A learner owns its networks and its experience. To write a learner:
+curve and picks the best snapshot of the weights. A learner owns its networks and its experience. To write a learner:
 
 1. Write a frozen dataclass with the members of `Learner`; its fields are the settings and the flags of `run`.
 2. Return from `trainer` an object with the members of `Trainer`. It trains all given seeds together.
@@ -110,7 +110,7 @@ class Learner(Protocol):
 
     @property
     def timing_run(self) -> Learner:
-        """A learner, or this one, whose last epoch takes as long as most epochs of this one.
+        """A short learner, perhaps this one, whose last epoch takes as long as a typical epoch of this one.
 
         The harness trains it to estimate the time of a whole training.
         """

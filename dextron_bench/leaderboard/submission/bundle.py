@@ -40,7 +40,7 @@ MEMBER_DATE = (1980, 1, 1, 0, 0, 0)  # The same for every member, so that equal 
 
 
 class BadBundle(ValueError):
-    """A file that is not a complete bundle, or a bundle with a false claim."""
+    """A file that is not a complete bundle, or files that differ from its manifest."""
 
 
 def pack(folder: Path, entry: Mapping[str, Any], agent: Mapping[str, Path], file: Path) -> dict[str, Any]:
