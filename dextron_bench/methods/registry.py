@@ -110,11 +110,6 @@ def run_source(method: Entrant, reaches: str) -> str:
     return (getattr(method, "train_source", "") if isinstance(method, Learner) else "") or reaches
 
 
-def code_origin(text: str) -> dict[str, str | None]:
-    """Where a method's code comes from: `class` is its name, `sha256` the hash of its file, None if it has none."""
-    return loading.class_origin(find_method(text))
-
-
 def describe(name: str) -> str:
     """The first line of an installed method's docstring, or why the method cannot be used."""
     try:

@@ -272,14 +272,6 @@ def test_products_of_numpy_use_one_thread_by_default():
         assert done.stdout.endswith(f"{threads}\n")
 
 
-@pytest.mark.parametrize("order", ["dextron_bench, gymnasium", "gymnasium, dextron_bench"])
-def test_gymnasium_knows_the_environment_in_either_order_of_import(order: str):
-    find = "import importlib.util; importlib.util.find_spec('gymnasium')"  # This must not import it.
-    script = f"import {order.split(',')[0]}; {find}; import {order}; print(gymnasium.spec('dextron_bench/Grasp-v0').id)"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert (done.stdout, done.stderr) == ("dextron_bench/Grasp-v0\n", "")
-
-
 @pytest.mark.parametrize(
     "words",
     [

@@ -65,13 +65,13 @@ def test_a_method_is_found_by_its_file_which_is_executed_once(file: Callable[[st
 
 def test_the_hash_of_a_file_changes_with_its_content(file: Callable[[str], Path]):
     spec = f"{file(AGENT)}:Mine"
-    before = registry.code_origin(spec)
+    before = loading.class_origin(registry.find_method(spec))
     assert before["class"] == "mine.py:Mine"
     file(AGENT + "# A comment.\n")
-    assert registry.code_origin(spec)["sha256"] != before["sha256"]
+    assert loading.class_origin(registry.find_method(spec))["sha256"] != before["sha256"]
     assert (
-        registry.code_origin("exp")
-        == registry.code_origin("baselines.exp:Exp")
+        loading.class_origin(registry.find_method("exp"))
+        == loading.class_origin(registry.find_method("baselines.exp:Exp"))
         == {"class": "baselines.exp:Exp", "sha256": None}
     )
 
