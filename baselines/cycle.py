@@ -16,7 +16,7 @@ from baselines.normalise import CLIP, Moments
 from baselines.policy import STATE
 from baselines.replay import Replay, Transitions
 from baselines.sac import BATCH, Batch, Sac
-from baselines.schedule import Schedule
+from baselines.schedule import Exploration, Schedule
 from dextron_bench import Case, Track
 from dextron_bench.methods.learners import Arrays
 from dextron_bench.world.engine import Engine
@@ -24,25 +24,35 @@ from dextron_bench.world.engine import Engine
 CAPACITY = 1_000_000  # Transitions in either buffer (table II).
 FRAMES = 1000  # Control steps of the agent in an epoch.
 
-NETWORKS, EPISODES, DEMONSTRATIONS, ACTING, WARM_START, BATCHES, NOISE = range(7)  # The random streams of each seed.
+# The random streams of each seed.
+NETWORKS, EPISODES, DEMONSTRATIONS, ACTING, WARM_START, BATCHES, NOISE, HOLDING = range(8)
 
 
 class Cycle:
     """The Trainer of RL and RLIL: trains S agents by SAC; each batch has a share of demonstrations."""
 
-    def __init__(self, track: Track, seeds: Sequence[int], schedule: Schedule, demonstrated: int) -> None:
-        """Trains one agent per seed; `demonstrated` of the BATCH transitions in each update come from experts."""
+    def __init__(
+        self,
+        track: Track,
+        seeds: Sequence[int],
+        schedule: Schedule,
+        demonstrated: int,
+        exploration: Exploration = Exploration(),  # noqa: B008 (frozen)
+        critics: int = 1,
+    ) -> None:
+        """Trains one agent per seed, with `critics` Q; `demonstrated` of the BATCH transitions come from experts."""
         self.epoch = 0
-        self._track, self._seeds, self._schedule = track, list(seeds), schedule
+        self._track, self._seeds, self._schedule, self._exploration = track, list(seeds), schedule, exploration
         self._demonstrated, self._frames = demonstrated, 0
         agents = len(self._seeds)
-        self._sac = Sac([self._rng(seed, NETWORKS) for seed in seeds], track.device)
+        self._sac = Sac([self._rng(seed, NETWORKS) for seed in seeds], track.device, critics)
         self._states, self._rewards = Moments(agents, STATE), Moments(agents, 1)
         self._replay = Replay(agents, CAPACITY + CAPACITY // 16)
         self._ids = np.arange(agents)
         self._engine = Engine(agents, track.threads)
         self._episodes = np.zeros(agents, int)
         self._score = np.zeros(agents)
+        self._noise, self._length, self._holds = np.zeros((agents, 1)), np.zeros(agents, int), np.zeros(agents, bool)
         self._recent: list[tuple[Transitions, np.ndarray]] = []
         if demonstrated:
             self._demos = demonstrations.load(track, schedule.episodes)
@@ -59,11 +69,17 @@ class Cycle:
         scores: list[list[float]] = [[] for _ in self._seeds]
         for t in range(FRAMES):
             is_warm = self._frames >= self._schedule.warm_start
-            self._step(self._act(acting[t]) if is_warm else random[t], scores)
-            if is_warm:
+            noise_now = self._hold(acting[t] if is_warm else random[t], everywhere=not is_warm)
+            self._step(self._act(noise_now) if is_warm else noise_now, scores)
+            if is_warm or self._frames >= self._first_update:
                 losses.append(self._sac.update(self._batch(selections[t]), noise[t]))
         self.epoch += 1
         return self._metrics(losses, scores)
+
+    @property
+    def _first_update(self) -> int:
+        """Frames before the first update: those of the warm start, but one batch if the noise is held."""
+        return self._schedule.warm_start if self._exploration.hold == 1 else BATCH
 
     def weights(self) -> list[Arrays]:
         """The policy's layers, and `mean` and `deviation` of states, for each seed."""
@@ -122,7 +138,14 @@ class Cycle:
         """The arrays that training changes in place, by name."""
         scales = {"states": self._states, "rewards": self._rewards}
         arrays = {f"{key}.{name}": array for key, moments in scales.items() for name, array in vars(moments).items()}
+        arrays |= {"noise": self._noise, "length": self._length, "holds": self._holds}
         return arrays | {"now": self._now, "score": self._score, "episodes": self._episodes}
+
+    def _hold(self, fresh: np.ndarray, everywhere: bool) -> np.ndarray:
+        """The exploration noise (S, 1) of this step: `fresh`, or the noise that an episode holds."""
+        renewed = ~(self._holds | everywhere) | (self._length % self._exploration.hold == 0)
+        self._noise[renewed] = fresh[renewed]
+        return self._noise.copy()
 
     def _step(self, actions: np.ndarray, scores: list[list[float]]) -> None:
         """Plays actions (S, 1) and stores the transitions; adds the returns of finished episodes to `scores`."""
@@ -137,6 +160,7 @@ class Cycle:
         self._replay.add(transitions, ended)
         self._recent.append((transitions, ended))
         self._frames += 1
+        self._length += 1
         self._score += step.rewards
         self._now[:] = step.states
         if ended.any():
@@ -148,6 +172,10 @@ class Cycle:
     def _begin(self, agents: np.ndarray) -> np.ndarray:
         """Starts the next episode of each agent of `agents` (n,); returns the first states (n, 48)."""
         cases = [self._case(int(k), int(self._episodes[k])) for k in agents]
+        for k in agents:
+            draw = self._rng(self._seeds[k], HOLDING, int(self._episodes[k])).random()
+            self._holds[k] = draw < self._exploration.share
+        self._length[agents] = 0
         self._episodes[agents] += 1
         return self._engine.begin(agents, [self._track.source.path(case.setting) for case in cases])
 

@@ -10,8 +10,14 @@ import numpy as np
 
 from baselines.cycle import Cycle
 from baselines.policy import MeanAgent
-from baselines.schedule import SCHEDULES, Scheduled
+from baselines.schedule import SCHEDULES, Exploration, Scheduled
 from dextron_bench import Track, Trainer
+
+HELD_SHARE = 0.25  # Share of the episodes after the warm start that hold their noise, if `hold` is above 1.
+
+
+class BadExploration(ValueError):
+    """A hold or a number of critics that no training can have."""
 
 
 @dataclass(frozen=True)
@@ -20,9 +26,32 @@ class Rl(Scheduled):
 
     name: ClassVar[str] = "rl"
 
+    hold: int = 1
+    """Control steps for which an exploration noise is held; 1 is the paper's. Above 1, updates begin at once."""
+    critics: int = 1
+    """Number of Q: 1 is the paper's; with 2, V and the policy learn from the smaller value."""
+
+    def __post_init__(self) -> None:
+        if self.hold < 1:
+            raise BadExploration(f"--hold is {self.hold}; a noise is held for at least 1 step")
+        if self.critics not in (1, 2):
+            raise BadExploration(f"--critics is {self.critics}; choose 1 or 2")
+
+    @property
+    def stem(self) -> str:
+        """The name with the settings that are not the paper's, such as "rl-hold40"."""
+        hold = f"-hold{self.hold}" if self.hold > 1 else ""
+        return f"{self.method_stem}{hold}{'-2q' if self.critics == 2 else ''}"
+
+    @property
+    def method_stem(self) -> str:
+        """The part of the label that names the paper's method."""
+        return self.name
+
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """A trainer with one SAC agent per seed, all trained together."""
-        return Cycle(track, seeds, SCHEDULES[self.preset], self.demonstrated)
+        exploration = Exploration(self.hold, HELD_SHARE if self.hold > 1 else 0.0)
+        return Cycle(track, seeds, SCHEDULES[self.preset], self.demonstrated, exploration, self.critics)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
         """The agent that plays the policy's mean."""

@@ -23,11 +23,12 @@ class Rlil(Rl):
     """Demo-use ratio: the share of expert transitions in each batch, 0 to 1."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0.0 <= self.dur <= 1.0:
             raise BadShare(f"--dur is {self.dur:g}; a demo-use ratio lies between 0 and 1")
 
     @property
-    def stem(self) -> str:
+    def method_stem(self) -> str:
         """The name with the demo-use ratio, such as "rlil-0.1"."""
         return f"{self.name}-{self.dur:g}"
 

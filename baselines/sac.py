@@ -1,7 +1,9 @@
 """Soft actor-critic, first version, for S agents at once (Haarnoja et al., 2018): one Q, one V, one policy.
 
-The paper's authors compute the policy's loss with a likelihood ratio, but its gradient is not the gradient of the
-objective. Here the gradient goes through the action, as the authors of soft actor-critic derive it.
+The gradient of the policy's loss goes through the action, as the authors of soft actor-critic derive it. The paper's
+authors use a likelihood ratio, which has the same expected gradient.
+
+With two critics (two Q), V and the policy learn from the smaller value, as in the later versions of soft actor-critic.
 """
 
 from __future__ import annotations
@@ -48,8 +50,8 @@ def value_target(action_value: Tensor, log_probability: Tensor) -> Tensor:
 
 
 def squared_error(prediction: Tensor, target: Tensor) -> Tensor:
-    """Mean squared error of each agent, (S,)."""
-    return (prediction - target).square().mean(dim=(1, 2))
+    """Mean squared error of each agent, (..., S), of predictions (..., S, B, 1)."""
+    return (prediction - target).square().mean(dim=(-2, -1))
 
 
 def policy_loss(action_value: Tensor, log_probability: Tensor, mean: Tensor, log_std: Tensor) -> Tensor:
@@ -61,10 +63,11 @@ def policy_loss(action_value: Tensor, log_probability: Tensor, mean: Tensor, log
 class Sac:
     """Networks, optimiser and updates of S agents."""
 
-    def __init__(self, rngs: Sequence[np.random.Generator], device: str = "cpu") -> None:
-        """Initialises each agent's networks from its own generator."""
+    def __init__(self, rngs: Sequence[np.random.Generator], device: str = "cpu", critics: int = 1) -> None:
+        """Initialises each agent's networks, with `critics` Q, from its own generator."""
+        self._critics = critics
         self.policy = Stack.make(policy.STATE, 2, rngs, device)
-        self.action_value = Stack.make(policy.STATE + 1, 1, rngs, device)
+        self.action_value = Stack.make(policy.STATE + 1, 1, [*rngs] * critics, device)
         self.value = Stack.make(policy.STATE, 1, rngs, device)
         self.target = self.value.copy()
         self.optimiser = torch.optim.Adam(self.trained_parameters, lr=LEARNING_RATE, fused=True)
@@ -83,15 +86,20 @@ class Sac:
         """Losses (3, S) of Q, V and policy; the gradient of each loss reaches only its own network."""
         mean, log_std = policy.head(self.policy(batch.states))
         actions, log_probability = policy.sample(mean, log_std, noise)
-        sampled = self.action_value.frozen()(torch.cat([batch.states, actions], dim=-1))
+        sampled = self._action_values(self.action_value.frozen(), batch.states, actions).amin(dim=0)
         with torch.no_grad():
             target = action_value_target(batch.rewards, batch.alive, self.target(batch.nexts), DISCOUNT)
-        taken = self.action_value(torch.cat([batch.states, batch.actions], dim=-1))
+        taken = self._action_values(self.action_value, batch.states, batch.actions)
         return torch.stack([
-            squared_error(taken, target),
+            squared_error(taken, target).sum(dim=0),
             squared_error(self.value(batch.states), value_target(sampled, log_probability).detach()),
             policy_loss(sampled, log_probability, mean, log_std),
         ])  # fmt: skip
+
+    def _action_values(self, networks: Stack, states: Tensor, actions: Tensor) -> Tensor:
+        """Values (critics, S, B, 1) of actions (S, B, 1) in states (S, B, 48)."""
+        inputs = torch.cat([states, actions], dim=-1)
+        return networks(inputs.repeat(self._critics, 1, 1)).unflatten(0, (self._critics, len(inputs)))
 
     def update(self, batch: Batch, noise: Tensor) -> Tensor:
         """One gradient step of every network and agent; returns the losses (3, S)."""

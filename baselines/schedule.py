@@ -29,6 +29,17 @@ SCHEDULES: dict[str, Schedule] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Exploration:
+    """How an agent explores: control steps for which a noise is held, and the share of later episodes that hold it.
+
+    In the warm start, all episodes hold it. With a hold of 1 the noise is new at each step, as in the paper.
+    """
+
+    hold: int = 1
+    share: float = 0.0
+
+
 @dataclass(frozen=True)
 class Scheduled:
     """The common settings of the baselines that learn: a preset, which names the run and sets its schedule."""

@@ -62,7 +62,7 @@ COMMANDS: dict[str, type[Command] | Group] = {
         "Reaches: import or download the recorded ones, describe a source, fit and evaluate the synthetic ones; "
         "export episodes for offline learning.",
         {
-            **{"import": data.Import, "fetch": data.Fetch, "info": data.Info},
+            **{"import": data.Import, "fetch": data.Fetch, "info": data.Info, "agreement": data.Agreement},
             **{"fit": data_synthetic.Fit, "likeness": data_synthetic.Likeness, "export": data_export.Export},
         },
     ),

@@ -1,4 +1,4 @@
-"""`dextron-bench data`: gets the recorded reaches and describes a source of reaches."""
+"""`dextron-bench data`: gets the recorded reaches, describes a source of reaches, compares outcomes."""
 
 from __future__ import annotations
 
@@ -86,4 +86,38 @@ class Info:
             from dextron_bench.scores.figures import reach_paths
 
             reach_paths(source, self.picture)
+        return DONE
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Play settings and experts whose outcomes on another hand are known, and report how often the hands agree.
+
+    Example: dextron-bench data agreement --with reference-outcomes.csv
+    """
+
+    file: Annotated[Path, tyro.conf.arg(name="with", metavar="CSV")]
+    """Outcomes: reach, duration_noise, offset_x, offset_y, gain, critical_distance, return_on_mesh_hand, stratum."""
+    quiet: bool = False
+    """Show no progress."""
+    json: bool = False
+    """Print JSON, one object for each stratum."""
+
+    def __call__(self) -> int:
+        from dextron_bench.evaluation import agreement
+        from dextron_bench.reaches.sources import open_source
+
+        outcomes = agreement.read(self.file.expanduser())
+        source = open_source("real")
+        with progress_bar("episodes", self.quiet) as progress:
+            returns = agreement.play(outcomes, source, progress)
+        table = agreement.by_stratum(outcomes, returns)
+        if self.json:
+            print_json(table.to_dict("records"))
+        else:
+            columns = ["stratum", "rows", "equal success [%]", "standard error", "equal return [%]"]
+            columns += ["theirs [%]", "ours [%]", "only theirs", "only ours"]
+            shares = ["agreement", "standard_error", "same_return", "theirs", "ours"]
+            rows = table.assign(**{name: 100.0 * table[name] for name in shares}).itertuples(index=False)
+            print_table(f"agreement with {self.file.name}", columns, rows)
         return DONE

@@ -41,6 +41,22 @@ def test_losses_by_hand():
     assert_close(actual, torch.tensor([(1 - 2 + 0.001 + 1 - 4 + 0.004) / 2]))
 
 
+def test_with_two_critics_the_smaller_value_is_the_one_that_counts():
+    """Both Q output a constant: 3 and 1; V's target and the policy's loss follow from 1, Q's losses from each."""
+    learner = Sac([np.random.default_rng(0)], critics=2)
+    weight, bias = learner.action_value.parameters[-2:]
+    with torch.no_grad():
+        weight.zero_()
+        bias.copy_(torch.tensor([3.0, 1.0])[:, None, None])
+        for parameter in (*learner.target.parameters, *learner.value.parameters, *learner.policy.parameters):
+            parameter.zero_()
+    rows = batch(np.random.default_rng(1), 1)
+    rewards = torch.full_like(rows.rewards, 2.0)
+    losses = learner.losses(Batch(rows.states, rows.actions, rewards, rows.nexts, rows.alive), torch.zeros(1, 4, 1))
+    density = -0.5 * math.log(2.0 * math.pi)  # Of the action 0 under a standard normal, squashed with slope 1.
+    assert_close(losses[:, 0], torch.tensor([1.0 + 1.0, (1.0 - density) ** 2, density - 1.0]))
+
+
 @pytest.mark.parametrize(("loss", "network"), [(0, "action_value"), (1, "value"), (2, "policy")])
 def test_the_gradient_of_each_loss_reaches_only_its_network(loss, network):
     learner = agents(0)

@@ -13,14 +13,14 @@ from baselines.bc import Cloning, imitation_loss
 from baselines.cycle import Cycle
 from baselines.demonstrations import load
 from baselines.policy import MeanAgent
-from baselines.schedule import Schedule
+from baselines.schedule import Exploration, Schedule
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import Track, Trainer
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 SCHEDULE = Schedule(epochs=4, warm_start=60, period=1)
-KINDS = ("rl", "rlil", "bc")
+KINDS = ("rl", "held", "rlil", "bc")
 
 
 @pytest.fixture(autouse=True)
@@ -34,6 +34,8 @@ def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: 
     track = Track(SOURCE, CASES, folder, threads=1)
     if kind == "bc":
         return Cloning(load(track), seeds)
+    if kind == "held":
+        return Cycle(track, seeds, schedule, 9, Exploration(hold=7, share=0.5), critics=2)
     return Cycle(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
 
 
@@ -54,7 +56,7 @@ def test_a_restored_trainer_continues_bit_for_bit(kind: str, tmp_path: Path):
         np.testing.assert_array_equal(array, restored[name], err_msg=name)
 
 
-@pytest.mark.parametrize("kind", ["rl", "rlil"])
+@pytest.mark.parametrize("kind", ["rl", "held", "rlil"])
 def test_a_short_training_equals_the_first_epochs_of_a_long_one(kind: str, tmp_path: Path):
     short, long = (trainer(kind, tmp_path, schedule=Schedule(epochs, 60, 1)) for epochs in (2, 7))
     for _ in range(2):
@@ -118,6 +120,34 @@ def test_updates_start_after_the_warm_start(tmp_path: Path):
     before = late.weights()[0]["policy.4"]
     assert "value_loss" not in late.advance()[0]
     np.testing.assert_array_equal(late.weights()[0]["policy.4"], before)
+
+
+def test_held_noise_is_renewed_every_hold_steps_and_updates_begin_after_a_batch(tmp_path: Path):
+    """In the warm start the noise is the action, so the actions themselves are held, from the start of each episode."""
+    track = Track(SOURCE, CASES, tmp_path, threads=1)
+    learner = Cycle(track, [0], Schedule(4, 400, 1), 0, Exploration(hold=7))
+    (metrics,) = learner.advance()
+    assert "value_loss" in metrics
+    journal = learner.journal()
+    actions, ended = journal["actions"][:, 0], journal["ended"][:, 0].astype(bool)
+    blocks = actions[: (np.argmax(ended) or 80) // 7 * 7].reshape(-1, 7)  # Of the first episode.
+    assert len(blocks) >= 3
+    assert (blocks == blocks[:, :1]).all()
+    assert len(np.unique(blocks[:, 0])) == len(blocks)
+
+
+def test_after_the_warm_start_a_share_of_the_episodes_holds_its_noise(tmp_path: Path):
+    track = Track(SOURCE, CASES, tmp_path, threads=1)
+    noises = []
+    for share in (0.0, 1.0):
+        learner = Cycle(track, [0], Schedule(4, 0, 1), 0, Exploration(hold=40, share=share))
+        fresh = np.random.default_rng(0).normal(size=(40, 1, 1))
+        held = []
+        for noise in fresh:
+            held.append(float(learner._hold(noise, everywhere=False)[0, 0]))
+            learner._length += 1
+        noises.append(len(set(held)))
+    assert noises == [40, 1]
 
 
 def test_the_imitation_loss_by_hand():

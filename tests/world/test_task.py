@@ -14,7 +14,7 @@ HALF = np.sqrt(0.5)
 
 def states(n: int = 1) -> np.ndarray:
     """States (n, 48) at the start of an episode: the palm's origin at (0, -0.335, 0.2), unturned."""
-    return np.tile(np.concatenate([model.half_closed(), np.zeros(23)]), (n, 1))
+    return np.tile(np.concatenate([model.initial_qpos(), np.zeros(23)]), (n, 1))
 
 
 def trajectory(bottle: list[float], hand: list[float] | None = None) -> np.ndarray:
@@ -36,18 +36,6 @@ def play(trajectory: np.ndarray, poses: int = 10_000) -> tuple[list[float], int,
         if terminated[0] or truncated[0]:
             return rewards, k, bool(terminated[0]), bool(truncated[0])
     return rewards, 0, False, False
-
-
-def test_every_digit_starts_half_closed_with_the_thumb_opposed():
-    angles = {
-        "thumb_base": 1.05,
-        "thumb_proximal": -0.285,
-        "thumb_distal": -0.2565,  # Coupled 0.9 to 1.
-        **{f"{finger}_{part}": 0.785 for finger in model.DIGITS[1:] for part in ("proximal", "distal")},
-    }
-    qpos = model.half_closed()
-    measured = {name: float(qpos[model.load().joint(name).qposadr[0]]) for name in angles}
-    assert measured == pytest.approx(angles)
 
 
 def test_the_palm_centre_rotates_with_the_palm():
