@@ -51,5 +51,5 @@ class Splits:
             return building_minjerk.build(self.into, engine)
         if self.database is None:
             raise NeedsDatabase(f"splits of {self.reaches} reaches need --database, which `dextron-bench mc` writes")
-        rows, tried = experts_database.load(self.database), experts_database.summary(self.database)["search"]["experts"]
-        return building.build(open_source(self.reaches), rows, tried, self.into, engine)
+        rows, summary = experts_database.load(self.database), experts_database.summary(self.database)
+        return building.build(open_source(self.reaches), rows, summary, self.into, engine)

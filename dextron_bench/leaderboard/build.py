@@ -13,24 +13,29 @@ from dextron_bench.leaderboard import readme
 from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, provenance
 from dextron_bench.storage.run_folder import run_folders
+from dextron_bench.world import model
 
 ORIGIN = ("tier", "frames", "demonstrations", "seconds", "hardware", "privileged")
 Curves = dict[int, pd.DataFrame]  # By seed; columns epoch, return, success.
 
 
+class OtherPhysics(ValueError):
+    """A published result whose episodes were played with other physics, so that its scores do not compare."""
+
+
 def build(board: Path) -> list[Path]:
     """Writes table (CSV, JSON), README tables, pictures of learning curves and page into a leaderboard's folder.
 
-    The page links to the recordings in the folder beside the leaderboard's. Returns the files; raises DamagedFile,
-    BrokenRecording.
+    The page links to the recordings in the folder beside the leaderboard's. Returns the files; raises OtherPhysics,
+    DamagedFile, BrokenRecording.
     """
     from dextron_bench.leaderboard import page
     from dextron_bench.leaderboard.highlights import FOLDER
     from dextron_bench.scores import figures
 
-    results = list(result_files.results(board / RESULTS))
+    results = _results_of_this_world(board / RESULTS)
     rows = standings.table(results)
     table = _with_origin(rows, results)
     files = [board / "table.csv", board / "README.md", board / "table.json"]
@@ -45,6 +50,19 @@ def build(board: Path) -> list[Path]:
     text = page.document(rows, results, curves, board.resolve().parent / FOLDER)
     atomic.write_atomically(files[-1], lambda part: part.write_text(text, encoding="utf-8"))
     return files
+
+
+def _results_of_this_world(runs: Path) -> list[dict[str, Any]]:
+    """The results below a folder; raises OtherPhysics if one was played with other physics than this version's."""
+    results = list(result_files.results(runs))
+    for result in results:
+        if (physics := provenance.physics_of(result)) != model.mjcf_hash():
+            raise OtherPhysics(
+                f"{result['method']} on {result['reaches']} reaches, seed {result['seed']}, was played with physics "
+                f"{physics[:8] or 'unknown'}, and this version has {model.mjcf_hash()[:8]}; remove it from {runs}, "
+                "and run it again"
+            )
+    return results
 
 
 def _with_origin(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.DataFrame:

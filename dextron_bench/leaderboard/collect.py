@@ -10,8 +10,9 @@ from dextron_bench.methods import registry, weights
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, provenance
 from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.world import model
 
 RESULTS = "results"  # In the leaderboard's folder: a folder of runs without their large files.
 
@@ -23,13 +24,14 @@ class NothingToPublish(LookupError):
 def take(runs: Path, board: Path) -> list[Path]:
     """Copies results and curves of finished runs into the leaderboard's folder, and weights beside their methods.
 
-    A run is finished if its result holds all rows of all splits that rank methods. Returns the folders of results
-    that were written; raises NothingToPublish, DamagedFile, UnknownMethod, BadSettings.
+    A run is finished if its result holds all rows of all splits that rank methods. Runs with other physics than this
+    version's are left out. Returns the folders of results that were written; raises NothingToPublish, DamagedFile,
+    UnknownMethod, BadSettings.
     """
     taken = []
     for run in result_files.finished(runs):
         result = result_files.read_result(run.result)
-        if not _is_complete(result):
+        if provenance.physics_of(result) != model.mjcf_hash() or not _is_complete(result):
             continue
         copy = RunFolder(board / RESULTS / run.path.relative_to(runs))
         before = result_files.read_result(copy.result) if copy.result.exists() else {}
@@ -39,7 +41,10 @@ def take(runs: Path, board: Path) -> list[Path]:
         _ship_weights(run, result)
         taken.append(copy.path)
     if not taken:
-        raise NothingToPublish(f"no run in {runs} holds all splits that rank methods; `dextron-bench run` makes some")
+        raise NothingToPublish(
+            f"no run in {runs} holds all splits that rank methods, with this version's physics; "
+            "`dextron-bench run` makes some"
+        )
     return taken
 
 

@@ -11,6 +11,7 @@ from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.scores import cells
 from dextron_bench.splits.loading import SPLIT_NAMES
 from dextron_bench.storage import atomic
+from dextron_bench.world import model
 
 BEGIN, END = "<!-- made by `dextron-bench leaderboard build`: -->", "<!-- end of what was made -->"
 
@@ -35,6 +36,7 @@ def sections(rows: pd.DataFrame, with_curves: set[str]) -> Iterator[str]:
     Methods are in the order of their return on `test`, and ranks are the ranks on `test`. Only the sources in
     `with_curves` have a picture of learning curves.
     """
+    yield f"\nAll episodes were played with physics `{model.mjcf_hash()[:8]}`."
     for source, group in rows.groupby("reaches", sort=False):
         yield from _scores(str(source), group)
         if source in with_curves:

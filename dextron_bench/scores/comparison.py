@@ -11,6 +11,7 @@ import pandas as pd
 
 from dextron_bench.scores import paired
 from dextron_bench.splits import strata
+from dextron_bench.storage import provenance
 from dextron_bench.world import task
 
 ALL = "all"  # The group of all settings.
@@ -18,7 +19,7 @@ Results = Sequence[dict[str, Any]]  # Contents of `result.json`, one for each se
 
 
 class Incomparable(ValueError):
-    """The results were not scored on the same settings."""
+    """The results were not scored on the same settings with the same physics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +99,11 @@ def align(
     sources_a, sources_b = ({result["reaches"] for result in seeds} for seeds in results)
     source = _common_source(sources_a, sources_b, reaches)
     a, b = (_seed_scores(name, seeds, source, split) for name, seeds in zip(names, results, strict=True))
+    worlds = {provenance.physics_of(result)[:8] for seeds in results for result in seeds if result["reaches"] == source}
+    if len(worlds) > 1:
+        raise Incomparable(
+            f"the results were played with different physics, {_sorted_list(worlds)}; run the older again"
+        )
     if (a.digest, a.scores.shape[1]) != (b.digest, b.scores.shape[1]):
         raise Incomparable(
             f"{a.name} and {b.name} played different versions of {split} of {source} reaches, "

@@ -17,8 +17,8 @@ from dextron_bench.reaches import setting
 from dextron_bench.storage import hashing
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
-SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "open")
-EVALUATED = ("test", "unseen-reach", "unseen-subject")
+SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "hard", "open")
+EVALUATED = ("test", "unseen-reach", "unseen-subject", "hard")
 
 
 class UnknownRow(LookupError):

@@ -24,6 +24,11 @@ def collect(physics: str) -> dict[str, Any]:
     }
 
 
+def physics_of(result: dict[str, Any]) -> str:
+    """The hash of the physics with which the episodes of a result were played; empty if it does not say."""
+    return str((result.get("provenance") or {}).get("physics") or "")
+
+
 def _version(name: str) -> str | None:
     try:
         return version(name)

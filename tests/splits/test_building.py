@@ -12,12 +12,14 @@ from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import MinjerkSource
+from dextron_bench.reaches.reach import Path
 from dextron_bench.splits import building, building_minjerk
 from dextron_bench.splits.building import Sizes, TooFewRows
 from dextron_bench.splits.loading import cases_from_frame, split_digest
 from dextron_bench.world.engine import Engine
 
-SIZES = Sizes(evaluated=20, val=10, open=5, subjects=2, reaches=0.25)
+SIZES = Sizes(evaluated=20, val=10, open=5, reaches=0.25)
+RATES = {name: 0.01 * k for k, name in enumerate("abcdefgh", start=1)}  # Success rate of a search by subject.
 
 
 class Strata(setting.ReachSource):
@@ -50,7 +52,7 @@ def database() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def parts(database) -> dict[str, pd.DataFrame]:
-    return building.partition(Strata(), database, 0, SIZES, by_subject=True)
+    return building.partition(Strata(), database, 0, SIZES, RATES)
 
 
 def subjects(rows: pd.DataFrame) -> set[str]:
@@ -74,20 +76,50 @@ def test_no_split_shares_settings_reaches_or_subjects_that_it_must_not(parts):
     assert sum(map(len, settings)) == len(set.union(*settings))
 
 
+def test_one_unseen_subject_is_from_the_hardest_third_and_one_from_the_middle():
+    """Of nine subjects, three are in each third; the easiest three are never held out."""
+    rates = {"p": 0.5, "q": 0.1, "r": 0.9, "s": 0.3, "t": 0.8, "u": 0.2, "v": 0.7, "w": 0.4, "x": 0.6}
+    drawn = [building.unseen_subjects(rates, np.random.default_rng(seed)) for seed in range(40)]
+    assert {name for pair in drawn for name in pair} == {"q", "u", "s", "w", "p", "x"}
+    assert all(len(pair & {"q", "u", "s"}) == 1 and len(pair & {"w", "p", "x"}) == 1 for pair in drawn)
+
+
+def test_hard_takes_narrow_windows_and_at_most_half_of_them_from_the_rule(database, parts, monkeypatch):
+    """Windows go by row number: every third candidate is narrow, and the rule solves every narrow one but the fifth."""
+    train = parts["train"].assign(score=20.0).groupby(building.SETTING).head(1)
+    sizes = Sizes(evaluated=10, val=10, open=5, reaches=0.25, scan=64)
+    number = {name: k for k, name in enumerate(train.index)}
+    narrow = [k % 3 == 0 for k in number.values()]
+    scores = np.where(np.arange(64) < np.where(narrow, 5, 6)[:, None], 20.0, 0.0)  # 5 / 64 x 0.89 is 0.070, 6: 0.083.
+    monkeypatch.setattr(building, "scan", lambda source, rows, engine, points: scores)
+    monkeypatch.setattr(building, "solved_by_rule", lambda source, rows, engine: np.arange(len(rows)) % 5 != 4)
+    hard, rest = building.draw_hard(Strata(), train, None, sizes)
+    taken = [number[name] for name in hard.index]
+    assert taken == [0, 3, 6, 9, 12, 15, 27, 42, 57, 72]  # Five by the rule, then every fifth of the narrow rows.
+    np.testing.assert_allclose(hard["window"], 0.89 * 5 / 64)
+    assert set(rest.index) == set(train.index) - set(hard.index)
+
+
+def test_the_rule_closes_at_its_distance_whatever_the_reach():
+    """The palm's centre is 0.105 m ahead of the carrier: 0.4 - 0.105 = 0.295 m from the bottle's axis."""
+    path = Path(np.array([[0.0, -0.4, 0.1]]), np.array([[1.0, 0.0, 0.0, 0.0]]))
+    assert building.first_distance(path) == pytest.approx(0.295)
+
+
 def test_train_keeps_every_expert_of_a_setting_and_other_splits_keep_one(parts):
     assert (parts["train"].groupby(building.SETTING).size() == 2).all()
     assert (parts["test"].groupby(building.SETTING).size() == 1).all()
 
 
 def test_equal_seeds_give_equal_splits(database, parts):
-    again = building.partition(Strata(), database, 0, SIZES, by_subject=True)
+    again = building.partition(Strata(), database, 0, SIZES, RATES)
     for name, rows in parts.items():
         pd.testing.assert_frame_equal(rows, again[name])
 
 
 def test_a_database_that_is_too_small_raises(database):
     with pytest.raises(TooFewRows, match="needs 20 solved settings"):
-        building.partition(Strata(), database.head(60), 0, SIZES, by_subject=False)
+        building.partition(Strata(), database.head(60), 0, SIZES, None)
 
 
 def test_near_equal_settings_are_dropped():

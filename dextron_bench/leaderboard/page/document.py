@@ -18,6 +18,7 @@ from dextron_bench.leaderboard.page.html import Html, join, tag
 from dextron_bench.leaderboard.page.rows import Entry, entries
 from dextron_bench.leaderboard.page.sections import Curves
 from dextron_bench.splits.loading import SPLIT_NAMES
+from dextron_bench.world import model
 
 FILE = "index.html"
 SELECTED = {"reaches": "real", "split": "test"}  # The page starts with these rows if scripts may run.
@@ -86,14 +87,15 @@ def _options(values: Sequence[str], selected: str | None) -> Html:
 
 
 def _facts(rows: pd.DataFrame) -> Html:
-    """How many methods, sources, rows and episodes the leaderboard has."""
+    """How many methods, sources, rows and episodes the leaderboard has, and the physics of all of them."""
     counts = {
         "methods": rows["method"].nunique(),
         "sources of reaches": rows["reaches"].nunique(),
         "rows": len(rows),
         "episodes": int(rows["episodes"].sum()),
     }
-    return join(*(tag("li", tag("b", f"{count:,}"), f" {name}") for name, count in counts.items()))
+    physics = tag("li", "physics ", tag("b", model.mjcf_hash()[:8]))
+    return join(*(tag("li", tag("b", f"{count:,}"), f" {name}") for name, count in counts.items()), physics)
 
 
 def _section(title: str, content: Sequence[Html]) -> Html | None:
