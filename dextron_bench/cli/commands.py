@@ -16,6 +16,7 @@ from dextron_bench.cli import (
     leaderboard_verify,
     mc,
     new_agent,
+    rebuild,
     recordings,
     recordings_choose,
     run,
@@ -73,5 +74,6 @@ COMMANDS: dict[str, type[Command] | Group] = {
         {"data": success.Data, "train": success.Train, "eval": success_eval.Eval, "explain": success_eval.Explain},
     ),
     "figures": figures.Figures,
+    "rebuild": rebuild.Rebuild,
     "doctor": doctor.Doctor,
 }

@@ -32,12 +32,14 @@ def read(file: Path) -> pd.DataFrame:
     missing = [name for name in ("reach", "stratum", *NUMBERS) if name not in table]
     if missing:
         raise BadOutcomes(f"{file}: has no column {missing[0]!r}; outcomes need reach, stratum, {', '.join(NUMBERS)}")
-    numbers = table[list(NUMBERS)].apply(pd.to_numeric, errors="coerce")
-    wrong = np.flatnonzero(~np.isfinite(numbers).all(axis=1) | table[["reach", "stratum"]].isna().any(axis=1))
-    if table.empty or len(wrong):
-        where = f"line {wrong[0] + 2}: a value is missing or not a number" if len(wrong) else "has no rows"
+    for name in NUMBERS:
+        table[name] = pd.to_numeric(table[name], errors="coerce")
+    usable = np.isfinite(table[list(NUMBERS)].to_numpy(float)).all(axis=1)
+    usable &= table[["reach", "stratum"]].notna().to_numpy().all(axis=1)
+    if table.empty or not usable.all():
+        where = "has no rows" if table.empty else f"line {np.argmin(usable) + 2}: a value is missing or not a number"
         raise BadOutcomes(f"{file}: {where}")
-    return table.assign(**numbers)
+    return table
 
 
 def play(outcomes: pd.DataFrame, source: setting.Source, progress: Progress = no_progress) -> np.ndarray:

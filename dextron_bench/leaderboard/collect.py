@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +22,17 @@ class NothingToPublish(LookupError):
     """A folder of runs without a finished one."""
 
 
-def take(runs: Path, board: Path) -> list[Path]:
+def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
     """Copies results and curves of finished runs into the leaderboard's folder, and weights beside their methods.
 
     A run is finished if its result holds all rows of all splits that rank methods. Runs with other physics than this
-    version's are left out. Returns the folders of results that were written; raises NothingToPublish, DamagedFile,
-    UnknownMethod, BadSettings.
+    version's are left out, and so are others than `only`, if it names labels with a source, such as rl/real. Returns
+    the folders of results that were written; raises NothingToPublish, DamagedFile, UnknownMethod, BadSettings.
     """
     taken = []
     for run in result_files.finished(runs):
+        if only and run.path.relative_to(runs).parent.as_posix() not in only:
+            continue
         result = result_files.read_result(run.result)
         if provenance.physics_of(result) != model.mjcf_hash() or not _is_complete(result):
             continue

@@ -93,7 +93,7 @@ def test_hard_takes_narrow_windows_and_at_most_half_of_them_from_the_rule(databa
     scores = np.where(np.arange(64) < np.where(narrow, 5, 6)[:, None], 20.0, 0.0)  # 5 / 64 x 0.89 is 0.070, 6: 0.083.
     monkeypatch.setattr(building, "scan", lambda source, rows, engine, points: scores)
     monkeypatch.setattr(building, "solved_by_rule", lambda source, rows, engine: np.arange(len(rows)) % 5 != 4)
-    hard, rest = building.draw_hard(Strata(), train, None, sizes)
+    hard, rest = building.draw_hard(Strata(), train, Engine(1, 1), sizes)
     taken = [number[name] for name in hard.index]
     assert taken == [0, 3, 6, 9, 12, 15, 27, 42, 57, 72]  # Five by the rule, then every fifth of the narrow rows.
     np.testing.assert_allclose(hard["window"], 0.89 * 5 / 64)

@@ -1,0 +1,142 @@
+"""`dextron-bench rebuild`: rebuilds everything that depends on the physics, and knows what is stale."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dextron_bench.cli.exit_codes import DONE
+from dextron_bench.cli.output import print_table
+from dextron_bench.cli.rebuild_steps import STEPS, Step
+
+LEDGER = Path("leaderboard/rebuilt.json")  # For every step: hashes of what it read and of what it made.
+DOCUMENTS = ("README.md", "docs/*.md", "recordings/README.md")  # Their numbers come from data.
+
+
+class NoCheckout(FileNotFoundError):
+    """The present folder is not a checkout of the project."""
+
+
+class UnknownStep(LookupError):
+    """A name that no step has."""
+
+
+class StepFailed(RuntimeError):
+    """A command of a step ended with an error."""
+
+
+@dataclass(frozen=True)
+class Rebuild:
+    """Rebuild what depends on the physics: databases, splits, trainings, success models, recordings, board, documents.
+
+    Run it in a checkout. A step is stale if the physics, its commands, the files that it reads or the files that it
+    made have changed since. Only stale steps run. If it is interrupted, the same command continues where it stopped.
+
+    Example: dextron-bench rebuild --list
+    """
+
+    step: tuple[str, ...] = ()
+    """Steps to run if they are stale; by default all, in order."""
+    list: bool = False
+    """Only print the steps, and which of them are stale."""
+    runs: Path = Path("runs")
+    """Folder of all runs, in which searches and trainings continue."""
+
+    def __call__(self) -> int:
+        steps = _chosen(self.step)
+        if not (Path("leaderboard").is_dir() and Path("dextron_bench/data").is_dir()):
+            raise NoCheckout("rebuild needs a checkout of the project as the present folder")
+        if self.list:
+            print_table("steps", ["step", "state"], [(step.name, _state(step)) for step in steps])
+            return DONE
+        for step in steps:
+            if _state(step) != "fresh":
+                print(f"rebuild: {step.name}", flush=True)
+                self._run(step)
+        return self._fill_documents()
+
+    def _run(self, step: Step) -> None:
+        read = _inputs(step)
+        for command in step.commands:
+            words = [path for word in shlex.split(command.format(runs=self.runs)) for path in _expanded(word)]
+            code = subprocess.run([sys.executable, "-m", "dextron_bench", *words]).returncode
+            if code:
+                raise StepFailed(f"{step.name}: `dextron-bench {' '.join(words)}` ended with code {code}; run it again")
+        for source, place in step.copies:
+            shutil.copyfile(self.runs / source, place)
+        if step.publishes:
+            from dextron_bench.leaderboard import collect
+
+            collect.take(self.runs, Path("leaderboard"), step.publishes)
+        _write_ledger(step, read)
+
+    def _fill_documents(self) -> int:
+        from dextron_bench.leaderboard import documents
+
+        files = [file for pattern in DOCUMENTS for file in sorted(Path().glob(pattern))]
+        for file in documents.fill(files, Path("leaderboard")):
+            print(f"rebuild: numbers in {file}")
+        return DONE
+
+
+def _chosen(names: Iterable[str]) -> list[Step]:
+    known = {step.name: step for step in STEPS}
+    if unknown := [name for name in names if name not in known]:
+        raise UnknownStep(f"no step {unknown[0]!r}; choose from {', '.join(known)}")
+    return [step for step in STEPS if not names or step.name in names]
+
+
+def _state(step: Step) -> str:
+    """`fresh`, `stale`, or `missing` if the step was never done here."""
+    entry = _ledger().get(step.name)
+    if entry is None:
+        return "missing"
+    return "fresh" if entry == {"inputs": _inputs(step), "outputs": _outputs(step)} else "stale"
+
+
+def _inputs(step: Step) -> str:
+    """The hash of the physics, of the step's commands and of the files that it reads."""
+    from dextron_bench.storage import hashing
+    from dextron_bench.world import model
+
+    files = "".join(f"{path} {digest}\n" for path, digest in _hashes(step.needs).items())
+    return hashing.digest(model.mjcf_hash().encode(), "\n".join(step.commands).encode(), files.encode())
+
+
+def _outputs(step: Step) -> dict[str, str]:
+    """The hashes of the files that a step makes, by path."""
+    published = [
+        f"{folder}/{name}" for name in step.publishes for folder in ("leaderboard/results", "baselines/weights")
+    ]
+    copied = [place for _, place in step.copies]
+    return _hashes((*step.makes, *copied, *(f"{folder}/*" for folder in published), *(f"{f}/*/*" for f in published)))
+
+
+def _hashes(patterns: Iterable[str]) -> dict[str, str]:
+    from dextron_bench.storage import hashing
+
+    files = {file for pattern in patterns for file in Path().glob(pattern) if file.is_file()}
+    return {file.as_posix(): hashing.sha256(file) for file in sorted(files)}
+
+
+def _expanded(word: str) -> Iterator[str]:
+    """The files that a pattern names; any other word unchanged."""
+    yield from (map(str, sorted(Path().glob(word))) if "*" in word else [word])
+
+
+def _ledger() -> dict[str, Any]:
+    from dextron_bench.storage import atomic
+
+    return atomic.read_json(LEDGER) if LEDGER.exists() else {}
+
+
+def _write_ledger(step: Step, read: str) -> None:
+    from dextron_bench.storage import atomic
+
+    atomic.write_json(LEDGER, {**_ledger(), step.name: {"inputs": read, "outputs": _outputs(step)}})

@@ -1,0 +1,116 @@
+"""The steps that rebuild everything that depends on the physics, in order (docs/rebuild.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+DATA = "dextron_bench/data"
+SPLITS = f"{DATA}/splits*"
+SEEDS = "0 1 2"
+WEIGHTS = "baselines/weights"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step: commands of `dextron-bench`, what they read, and what they make.
+
+    `needs` and `makes` are patterns of files below the checkout; `copies` are files of the folder of runs and their
+    places in the checkout. `publishes` are labels with a source, such as rl/real, that go to the leaderboard. In a
+    command, {runs} is the folder of runs, and words with a `*` are patterns of files.
+    """
+
+    name: str
+    commands: tuple[str, ...]
+    needs: tuple[str, ...] = ()
+    makes: tuple[str, ...] = ()
+    copies: tuple[tuple[str, str], ...] = ()
+    publishes: tuple[str, ...] = ()
+
+
+def _search(reaches: str, rows: int) -> Step:
+    found = f"mc/{reaches}/seed0/experts-{reaches}"
+    copies = tuple((found + end, f"{DATA}/experts-{reaches}{end}") for end in (".parquet", ".json"))
+    command = f"mc --reaches {reaches} --rows {rows} --seed 0 --runs {{runs}}"
+    return Step(f"experts-{reaches}", (command,), copies=copies)
+
+
+def _splits(reaches: str) -> Step:
+    """The splits of a source; the catalogue is rewritten by every source, so it is no part of what a step makes."""
+    command, needs = f"splits --reaches {reaches} --into {DATA}", ()
+    if reaches != "minjerk":
+        database = f"{DATA}/experts-{reaches}.parquet"
+        command, needs = f"{command} --database {database}", (database, f"{DATA}/experts-{reaches}.json")
+    return Step(f"splits-{reaches}", (command,), needs, (f"{DATA}/splits-{reaches}.parquet",))
+
+
+def _run(label: str, method: str, reaches: str, seeds: str = "0", needs: tuple[str, ...] = ()) -> Step:
+    """A run of a method on all splits that rank methods, with its training."""
+    command = f"run --method {method} --reaches {reaches} --seed {seeds} --no-floors --runs {{runs}}"
+    name = f"{label}/{reaches}"
+    return Step(name, (command,), (f"{DATA}/splits-{reaches}.parquet", *needs), publishes=(name,))
+
+
+LEARNERS = {  # By label: the flags of the method.
+    "bc": "bc",
+    "rl": "rl",
+    "rl-hold40": "rl --hold 40",
+    "rlil-0.1": "rlil --dur 0.1",
+    "rlil-0.3": "rlil --dur 0.3",
+    "rlil-0.3-2q": "rlil --dur 0.3 --critics 2",
+}
+RULES = ("exp", "reflex", "nothing", "random")
+SIM = f"{WEIGHTS}/sim-0.1/minjerk/*"
+
+
+def _success(reaches: str, rows: int, epochs: int) -> Step:
+    """The success model, trained on episodes of the experts and of the policies of the full budget."""
+    policies = [f"{WEIGHTS}/{label}/{reaches}/*.safetensors" for label in ("rlil-0.1", "rlil-0.3")]
+    data = f"success data --reaches {reaches} --rows {rows} --policies {' '.join(policies)} --runs {{runs}}"
+    train = f"success train --reaches {reaches} --epochs {epochs} --runs {{runs}}"
+    copies = ((f"success/{reaches}/seed0/model.safetensors", f"{DATA}/success-{reaches}.safetensors"),)
+    return Step(f"success-{reaches}", (data, train), (f"{DATA}/splits-{reaches}.parquet", *policies), copies=copies)
+
+
+def _show(method: str, reaches: str = "real") -> str:
+    return f"eval --method {method} --reaches {reaches} --seed 0 --split test --runs {{runs}}/show"
+
+
+STEPS: tuple[Step, ...] = (
+    _search("real", 10_000),
+    _search("synthetic", 5_000),
+    *map(_splits, ("real", "synthetic", "minjerk")),
+    *(_run(name, name, reaches) for reaches in ("real", "synthetic") for name in RULES),
+    *(_run(name, name, "minjerk") for name in ("nothing", "random")),
+    _run("sim-0.1", "sim", "minjerk", SEEDS),
+    *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
+    _run("rlil-0.1-quick", "rlil --dur 0.1 --preset quick", "real", SEEDS),
+    _run("sor", "sor", "real", SEEDS, (SIM,)),
+    *(_run(label, flags, "synthetic") for label, flags in LEARNERS.items()),
+    _run("sor", "sor", "synthetic", needs=(SIM,)),
+    _success("real", 3_000_000, 16),
+    _success("synthetic", 1_000_000, 30),
+    *(_run("omega", "omega", r, needs=(f"{DATA}/success-{r}.safetensors",)) for r in ("real", "synthetic")),
+    Step(
+        "recordings",
+        (
+            "run --method exp --reaches real --split test --no-floors --runs {runs}/show",
+            *map(_show, ("bc", "rl --hold 40", "rlil --dur 0.1", "rlil --dur 0.3", "sor")),
+            _show("sim", "minjerk"),
+            "recordings choose --reaches real minjerk --runs {runs}/show --into recordings",
+        ),
+        needs=(SPLITS, f"{WEIGHTS}/*/*/seed0.safetensors", f"{DATA}/success-*"),
+        makes=("recordings/*.rrd",),
+    ),
+    Step(
+        "figures",
+        ("figures --reaches real --into docs/pictures",),
+        needs=(f"{DATA}/*", "leaderboard/results/*/*/*/*.json"),
+        makes=("docs/pictures/fig*.png", "docs/pictures/h*.png"),
+    ),
+    Step(
+        "board",
+        ("leaderboard build",),
+        needs=("leaderboard/results/*/*/*/*.json", "recordings/*.rrd"),
+        makes=("leaderboard/table.*", "leaderboard/index.html", "leaderboard/README.md", "leaderboard/*.png"),
+    ),
+)
