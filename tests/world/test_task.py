@@ -92,7 +92,7 @@ def test_a_positive_action_closes_every_digit_and_a_negative_one_opens_it():
     assert (closing[[0, 2, 3, 4]] > resting[[0, 2, 3, 4]] + 0.1).all()
     assert closing[1] > resting[1]  # The index finger meets the thumb.
     assert (opening < resting - 0.1).all()
-    assert np.ptp(after) < 0.1  # Digits with different ranges take the same time.
+    assert np.ptp(opening) < 0.1  # Digits with different ranges take the same time.
 
 
 def test_the_first_step_of_the_countdown_earns_nothing_and_twenty_steps_earn_one():
