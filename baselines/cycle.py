@@ -78,7 +78,7 @@ class Cycle:
 
     @property
     def _first_update(self) -> int:
-        """Frames before the first update: those of the warm start, but one batch if the noise is held."""
+        """Frames before the first update: the warm start, or one batch if the noise is held."""
         return self._schedule.warm_start if self._exploration.hold == 1 else BATCH
 
     def weights(self) -> list[Arrays]:

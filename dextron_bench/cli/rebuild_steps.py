@@ -28,8 +28,8 @@ class Step:
 
 
 def _search(reaches: str, rows: int) -> Step:
-    found = f"mc/{reaches}/seed0/experts-{reaches}"
-    copies = tuple((found + end, f"{DATA}/experts-{reaches}{end}") for end in (".parquet", ".json"))
+    database = f"mc/{reaches}/seed0/experts-{reaches}"
+    copies = tuple((database + end, f"{DATA}/experts-{reaches}{end}") for end in (".parquet", ".json"))
     command = f"mc --reaches {reaches} --rows {rows} --seed 0 --runs {{runs}}"
     return Step(f"experts-{reaches}", (command,), copies=copies)
 

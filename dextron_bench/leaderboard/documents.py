@@ -100,10 +100,10 @@ def _values(board: Path) -> Callable[[str], str]:
 
 def _of_row(rows: pd.DataFrame, method: str, reaches: str, split: str, name: str) -> str:
     """A number of the leaderboard's row of a method on a split."""
-    found = rows[(rows["method"] == method) & (rows["reaches"] == reaches) & (rows["split"] == split)]
-    if len(found) != 1:
-        raise KeyError(f"the leaderboard has {len(found)} such rows")
-    row = found.iloc[0]
+    selected = rows[(rows["method"] == method) & (rows["reaches"] == reaches) & (rows["split"] == split)]
+    if len(selected) != 1:
+        raise KeyError(f"the leaderboard has {len(selected)} such rows")
+    row = selected.iloc[0]
     if name == "return":
         return f"{row['return']:.1f}"
     share = row["success"] if name == "success" else row[name.replace("-", " ")] / row["episodes"]

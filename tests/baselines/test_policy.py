@@ -56,3 +56,17 @@ def test_the_agent_scales_and_clips_states_and_plays_the_mean():
     states[:, 0] = [6.0, 1e6, 2.0]  # scaled: 1, 10 (clipped), 0
     np.testing.assert_allclose(agent.act(states)[:, 0], np.tanh([0.5, 5.0, 0.0]), atol=1e-6)
     assert agent.act(states).dtype == np.float64
+
+
+def test_a_likelihood_ratio_has_the_same_expected_gradient_as_the_gradient_through_the_action():
+    """Of E[log density - Q] in mean and log deviation, for Q = -3 (a - 0.5)^2. Four standard errors are 0.03."""
+    parameters = torch.tensor([0.3, -0.5], dtype=torch.float64, requires_grad=True)
+    noise = torch.tensor(np.random.default_rng(0).normal(size=400_000))
+    mean, log_std = parameters
+    actions, density = policy.sample(mean, log_std, noise)
+    (through,) = torch.autograd.grad((density + 3.0 * (actions - 0.5).square()).mean(), parameters, retain_graph=True)
+    raw = (mean + log_std.exp() * noise).detach()
+    of_fixed_action = policy.log_probability(raw, log_std, (raw - mean) / log_std.exp())
+    advantage = (density + 3.0 * (actions - 0.5).square()).detach()
+    (ratio,) = torch.autograd.grad((of_fixed_action * advantage).mean(), parameters)
+    assert_close(ratio, through, atol=0.03, rtol=0.0)

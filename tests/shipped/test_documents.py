@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from dextron_bench.cli.rebuild import DOCUMENTS
+from dextron_bench.leaderboard import documents
+
 ROOT = Path(__file__).parents[2]
 FENCE = re.compile(r"^```(?:python|py)\b[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -54,3 +57,15 @@ def test_code_in_documents_uses_names_that_exist(block: str):
 def test_a_renamed_function_is_noticed():
     code = "from dextron_bench import rollouts\nfrom dextron_bench.evaluation import diagnosis\ndiagnosis.table(1)"
     assert list(missing_names(ast.parse(code))) == ["dextron_bench.rollouts", "diagnosis.table"]
+
+
+def test_numbers_in_the_documents_are_those_of_the_data(tmp_path: Path):
+    """The same files as `dextron-bench rebuild` fills; at least the two pages with most numbers have some."""
+    files = [file for pattern in DOCUMENTS for file in sorted(ROOT.glob(pattern))]
+    copies = {file: tmp_path / str(number) for number, file in enumerate(files)}
+    for file, copy in copies.items():
+        copy.write_bytes(file.read_bytes())
+    changed = documents.fill(copies.values(), ROOT / "leaderboard")
+    assert [file for file, copy in copies.items() if copy in changed] == []
+    with_numbers = {file.name for file in files if documents.NUMBER.search(file.read_text(encoding="utf-8"))}
+    assert {"baselines.md", "monte-carlo.md"} <= with_numbers
