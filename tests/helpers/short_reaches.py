@@ -39,7 +39,7 @@ SETTINGS = (
     Setting("a", -0.02, 0.0, 0.7),
     Setting("a", 0.03, 0.04, 0.2),
 )
-CLOSING = (56, 76, 50, 59, 20)  # Control step from which the fingers close, for each setting.
+CLOSING = (56, 76, 50, 88, 20)  # Control step from which the fingers close, for each setting.
 
 
 def actions(k: int) -> np.ndarray:

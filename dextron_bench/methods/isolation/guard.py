@@ -60,7 +60,7 @@ def install(readable: Sequence[Path], scratch: Path) -> None:
 
 def hide_simulator() -> None:
     """Removes the simulator from this process; caches the values that pure functions of states need from it."""
-    for cached in (model.proximal, model.command_gain, model.half_closed, model.state_names):
+    for cached in (model.proximal, model.command_gain, model.initial_qpos, model.state_names):
         cached()
     model.load = model.mujoco = None  # type: ignore[assignment]
     package = vars(sys.modules["dextron_bench"])
