@@ -8,14 +8,14 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_table
 from dextron_bench.cli.rebuild_steps import STEPS, Step
 
-LEDGER = Path("leaderboard/rebuilt.json")  # For every step: hashes of what it read and of what it made.
+LEDGER = Path("leaderboard/rebuilt")  # A file for each step: hashes of what it read and of what it made.
 DOCUMENTS = ("README.md", "docs/*.md", "recordings/README.md")  # Their numbers come from data.
 
 
@@ -37,6 +37,7 @@ class Rebuild:
 
     Run it in a checkout. A step is stale if the physics, its commands, the files that it reads or the files that it
     made have changed since. Only stale steps run. If it is interrupted, the same command continues where it stopped.
+    Two commands may run different steps at the same time.
 
     Example: dextron-bench rebuild --list
     """
@@ -62,6 +63,8 @@ class Rebuild:
         return self._fill_documents()
 
     def _run(self, step: Step) -> None:
+        from dextron_bench.storage import atomic
+
         read = _inputs(step)
         for command in step.commands:
             words = [path for word in shlex.split(command.format(runs=self.runs)) for path in _expanded(word)]
@@ -69,12 +72,12 @@ class Rebuild:
             if code:
                 raise StepFailed(f"{step.name}: `dextron-bench {' '.join(words)}` ended with code {code}; run it again")
         for source, place in step.copies:
-            shutil.copyfile(self.runs / source, place)
+            atomic.write_atomically(Path(place), partial(shutil.copyfile, self.runs / source))
         if step.publishes:
             from dextron_bench.leaderboard import collect
 
             collect.take(self.runs, Path("leaderboard"), step.publishes)
-        _write_ledger(step, read)
+        atomic.write_json(_entry_file(step), {"inputs": read, "outputs": _outputs(step)})
 
     def _fill_documents(self) -> int:
         from dextron_bench.leaderboard import documents
@@ -94,10 +97,15 @@ def _chosen(names: Iterable[str]) -> list[Step]:
 
 def _state(step: Step) -> str:
     """`fresh`, `stale`, or `missing` if the step was never done here."""
-    entry = _ledger().get(step.name)
-    if entry is None:
+    from dextron_bench.storage import atomic
+
+    if not _entry_file(step).exists():
         return "missing"
-    return "fresh" if entry == {"inputs": _inputs(step), "outputs": _outputs(step)} else "stale"
+    return (
+        "fresh"
+        if atomic.read_json(_entry_file(step)) == {"inputs": _inputs(step), "outputs": _outputs(step)}
+        else "stale"
+    )
 
 
 def _inputs(step: Step) -> str:
@@ -130,13 +138,5 @@ def _expanded(word: str) -> Iterator[str]:
     yield from (map(str, sorted(Path().glob(word))) if "*" in word else [word])
 
 
-def _ledger() -> dict[str, Any]:
-    from dextron_bench.storage import atomic
-
-    return atomic.read_json(LEDGER) if LEDGER.exists() else {}
-
-
-def _write_ledger(step: Step, read: str) -> None:
-    from dextron_bench.storage import atomic
-
-    atomic.write_json(LEDGER, {**_ledger(), step.name: {"inputs": read, "outputs": _outputs(step)}})
+def _entry_file(step: Step) -> Path:
+    return LEDGER / f"{step.name}.json"
