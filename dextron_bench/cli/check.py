@@ -38,6 +38,8 @@ class Check:
     """Memory limit of the agent [GiB]."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor."""
+    trust: bool = False
+    """Run a policy's file (TorchScript, ONNX) even without a sandbox, with all your rights."""
     json: bool = False
     """Print the results of the checks as JSON."""
 
@@ -46,9 +48,8 @@ class Check:
         from dextron_bench.methods.isolation.isolated_agent import Limits
         from dextron_bench.methods.isolation.launch import prepare_launch
 
-        launch = prepare_launch(
-            self.agent, entry.settings_from_json(self.agent, self.settings, self.reaches), self.weights
-        )
+        settings = entry.settings_from_json(self.agent, self.settings, self.reaches)
+        launch = prepare_launch(self.agent, settings, self.weights, self.trust)
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
         results = []
         for check in conformance.checks(launch, self.reaches, limits, self.threads):

@@ -43,7 +43,9 @@ class Verify:
     stamp: bool = False
     """With --all: give baselines that ran again completely the tier `re-run`, and build the leaderboard."""
     rerun: bool = False
-    """Also run the agent of the submission again, isolated, from the files in its bundle."""
+    """Also run the agent of the submission again, in a sandbox, from the files in its bundle."""
+    trust: bool = False
+    """With --rerun: run the agent even without a sandbox, with all your rights; its tier stays `replayed`."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard."""
     threads: int = 0
@@ -59,7 +61,7 @@ class Verify:
         if self.bundle is None:
             return self._verify_board()
         with unpacked(self.bundle) as opened:
-            return print_verdict(_verify(opened, self.board, self.rerun, self.threads, self.quiet))
+            return print_verdict(_verify(opened, self))
 
     def _verify_board(self) -> int:
         from dextron_bench.leaderboard import build, verify_board
@@ -93,7 +95,9 @@ class Add:
     bundle: tyro.conf.Positional[Path]
     """The submission."""
     rerun: bool = False
-    """Also run its agent again, isolated; the tier of its row is then `re-run` instead of `replayed`."""
+    """Also run its agent again, in a sandbox; the tier of its row is then `re-run` instead of `replayed`."""
+    trust: bool = False
+    """With --rerun: run the agent even without a sandbox, with all your rights; its tier stays `replayed`."""
     replace: bool = False
     """Replace a submission of the same name."""
     board: Path = Path("leaderboard")
@@ -109,7 +113,7 @@ class Add:
         with unpacked(self.bundle) as opened:
             manifest = opened[1]
             add.check_name(manifest["name"], manifest["reaches"], self.board, self.replace)
-            verdict = _verify(opened, self.board, self.rerun, self.threads, self.quiet)
+            verdict = _verify(opened, self)
             code = print_verdict(verdict)
             if verdict.passed:
                 print(*add.merge(verdict, self.board), sep="\n")
@@ -125,11 +129,11 @@ def unpacked(file: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
         yield Path(folder), submission_bundle.unpack(file, Path(folder))
 
 
-def _verify(opened: tuple[Path, dict[str, Any]], board: Path, rerun: bool, threads: int, quiet: bool) -> Verdict:
+def _verify(opened: tuple[Path, dict[str, Any]], flags: Verify | Add) -> Verdict:
     from dextron_bench.leaderboard.submission import verification
 
-    with progress_bar("verifying", quiet) as progress:
-        return verification.verify(*opened, board, rerun, threads, report=progress)
+    with progress_bar("verifying", flags.quiet) as progress:
+        return verification.verify(*opened, flags.board, flags.rerun, flags.threads, trust=flags.trust, report=progress)
 
 
 def print_verdict(verdict: Verdict) -> int:

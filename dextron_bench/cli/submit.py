@@ -50,6 +50,8 @@ class Submit:
     """Time limit for one answer [s]."""
     memory: float = 4.0
     """Memory limit of the agent [GiB]."""
+    trust: bool = False
+    """Run a policy's file (TorchScript, ONNX) even without a sandbox, with all your rights."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     board: Path = Path("leaderboard")
@@ -85,7 +87,9 @@ class Submit:
 
         seeds = tuple(dict.fromkeys(self.seed))
         settings = submission_entry.settings_from_json(self.agent, self.settings, self.reaches)
-        return submission_entry.Entry(self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared)
+        return submission_entry.Entry(
+            self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared, self.trust
+        )
 
     def _standings(self, folder: Path) -> pd.DataFrame:
         """The leaderboard's rows on this source of reaches, with the rows of this submission."""

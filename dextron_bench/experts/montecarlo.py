@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -46,7 +47,13 @@ class Search:
             raise BadSearch("a search needs at least one expert and one setting per block, and a seed of 0 or more")
 
 
-def draw(source: setting.Source, search: Search, block: int) -> pd.DataFrame:
+class Sampler(Protocol):
+    """What draws settings: a source, or a part of one."""
+
+    def sample(self, rng: np.random.Generator) -> setting.Setting: ...
+
+
+def draw(source: Sampler, search: Search, block: int) -> pd.DataFrame:
     """The draws of one block, `experts` rows per setting; columns: the fields of `Setting`, `gain`, `critical`."""
     rng = np.random.default_rng([search.seed, block])
     settings = setting.to_frame([source.sample(rng) for _ in range(search.block)])
@@ -109,7 +116,15 @@ def run(
         blocks.write(folder, *next(new_blocks))
         done = blocks.update_tallies(folder, done)
         progress(blocks.total(done).solved, rows)
-    return pd.concat([blocks.read(blocks.block_file(folder, number)) for number in range(last + 1)], ignore_index=True)
+    return pd.concat([_stored(source, search, folder, number) for number in range(last + 1)], ignore_index=True)
+
+
+def _stored(source: setting.Source, search: Search, folder: Path, number: int) -> pd.DataFrame:
+    """A block that was played; raises DamagedBlock if it does not hold the draws with this number."""
+    file = blocks.block_file(folder, number)
+    block = blocks.read(file)
+    blocks.check(file, block, draw(source, search, number))
+    return block
 
 
 def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataFrame, count: int) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.methods import registry, weights
+from dextron_bench.methods import registry, specs, weights
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
@@ -78,8 +78,8 @@ def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]
 def _ship_weights(run: RunFolder, result: dict[str, Any]) -> None:
     """Copies the weights of an installed learner to the folder of shipped weights; skips methods in a file."""
     config = atomic.read_json(run.config)
-    if config["code"]["sha256"]:
-        return
+    if config["code"]["sha256"] or specs.parse(config["code"]["class"]).kind != "module":
+        return  # A config never makes the code of a file run.
     method = registry.create(config["code"]["class"], config["settings"])
     if isinstance(method, Learner):  # A policy transfer has no weights of its own.
         _copy(run.weights, weights.shipped_folder(method, result["reaches"]) / f"seed{result['seed']}.safetensors")

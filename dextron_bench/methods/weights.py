@@ -85,10 +85,18 @@ def load_agent(learner: Learner, file: Path) -> Agent:
 
 
 def load_agent_from_file(file: Path) -> Agent:
-    """The agent of a file that names its own method; raises BadWeights, UnknownMethod, BadTensors, OSError."""
+    """The agent of a file that names its own method; raises BadWeights, BadSettings, BadTensors, OSError.
+
+    The method must be installed: a file may come from a stranger, so its metadata never makes other code run.
+    """
     header = tensors.read_about(file)
-    if not {"method", "settings"} <= header.keys():
+    if "method" not in header or not isinstance(header.get("settings"), dict):
         raise BadWeights(f"{file} does not say which method's weights it holds")
+    if header["method"] not in registry.installed_methods():
+        raise BadWeights(
+            f"{file} says it holds weights of {header['method']!r}, which is not installed; a file of weights never "
+            f"imports code: choose from {', '.join(registry.installed_methods())}, or register it (CONTRIBUTING.md)"
+        )
     learner = registry.create(header["method"], header["settings"])
     if not isinstance(learner, Learner):
         raise BadWeights(f"{file} says it holds weights of {header['method']!r}, which has none")

@@ -52,6 +52,7 @@ class Entry:
     settings: dict[str, Any] = field(default_factory=dict)
     weights: Path | None = None
     declared: Declaration = field(default_factory=Declaration)
+    trust: bool = False  # A policy's file may start without a sandbox.
 
     def __post_init__(self) -> None:
         if self.name.casefold().split("-")[0] in registry.installed_methods():
@@ -66,7 +67,7 @@ class Entry:
     @property
     def launch(self) -> Launch:
         """How to start the agent's process; raises AgentError."""
-        return prepare_launch(self.spec, self.settings, self.weights)
+        return prepare_launch(self.spec, self.settings, self.weights, self.trust)
 
     def folder(self, runs: Path) -> Path:
         """The folder with the runs of its seeds."""

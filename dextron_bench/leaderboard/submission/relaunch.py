@@ -18,15 +18,18 @@ LOCATION = re.compile(r"[A-Za-z0-9][\w.+-]*", re.ASCII)  # A file of the bundle,
 CLASS = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
-def launch_of(agent: Mapping[str, Any], files: Path) -> Launch:
-    """How to start the agent that a manifest describes, from the folder of its files; raises BadBundle, AgentError."""
+def launch_of(agent: Mapping[str, Any], files: Path, trust: bool = False) -> Launch:
+    """How to start the agent that a manifest describes, from the folder of its files; raises BadBundle, AgentError.
+
+    Without `trust` it starts in the sandbox only.
+    """
     if agent["kind"] == "exec":
         raise bundle.BadBundle("a bundle does not contain the program of an `exec:` agent, so it cannot run again")
     spec = _checked_spec(agent["kind"], agent["spec"])
     weights = _agent_file(files, agent["weights"]) if agent["weights"] else None
     if spec.file:
         spec = replace(spec, location=str(_agent_file(files, spec.location)))
-    return prepare_launch(str(spec), agent["settings"], weights)
+    return replace(prepare_launch(str(spec), agent["settings"], weights), trusted=trust)
 
 
 def _checked_spec(kind: str, text: str) -> AgentSpec:

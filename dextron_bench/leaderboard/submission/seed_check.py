@@ -55,13 +55,13 @@ class SeedCheck:
             finding.add(f"recordings/{name} belongs to no row of the splits")
         return finding
 
-    def rerun(self, limits: Limits, threads: int, report: Progress) -> SeedFinding:
-        """Runs the agent again and compares its episodes with the replayed ones."""
+    def rerun(self, limits: Limits, trust: bool, threads: int, report: Progress) -> SeedFinding:
+        """Runs the agent again, in the sandbox only without `trust`, and compares its episodes with the replayed ones."""
         finding, differing = SeedFinding(self._seed), []
         source = sources.open_source(self._manifest["reaches"])
         total, done = sum(len(split.cases) for split in self._splits), 0
         try:
-            launch = relaunch.launch_of(self._manifest["agent"], self._agent_files)
+            launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, trust)
             for split in self._splits:
                 for row, episode in playing.play_shuffled(launch, source, split, self._seed, limits, threads):
                     done += 1

@@ -28,11 +28,13 @@ def verify(
     rerun: bool = False,
     threads: int = 0,
     limits: Limits | None = None,
+    trust: bool = False,
     report: Progress = no_progress,
 ) -> Verdict:
     """Checks an unpacked bundle (see `bundle.unpack`) against the splits, the engine and the results on a board.
 
-    With `rerun` the agent also runs again, from the files in the bundle. Raises MissingData, OSError.
+    With `rerun` the agent also runs again, from the files in the bundle, and in the sandbox only unless `trust` is
+    True. Raises MissingData, OSError.
     """
     verdict, numbers = Verdict(manifest), manifest["seeds"]
     if manifest["physics"] != model.mjcf_hash():
@@ -47,28 +49,38 @@ def verify(
     if extra := sorted({run.seed for run in seed_folders(folder)} - set(numbers)):
         verdict.problems.append(f"holds seed{extra[0]}, which is not among the seeds that its manifest lists")
     if rerun and verdict.passed:
-        _rerun(folder, seeds, verdict, limits or Limits(), threads, report)
-    _check_copies(verdict, board, rerun)
+        _rerun(folder, seeds, verdict, limits or Limits(), trust, threads, report)
+    _check_copies(verdict, board)
     return verdict
 
 
-def _check_copies(verdict: Verdict, board: Path | None, rerun: bool) -> None:
-    """Adds a note if all seeds are equal, and a problem for copied episodes; only a note if the agent ran again."""
+def _check_copies(verdict: Verdict, board: Path | None) -> None:
+    """Adds a note if all seeds are equal, and a problem for copied episodes; only a note if the agent was re-run."""
     if len(verdict.results) > 1 and duplicates.all_equal(verdict.results):
         verdict.notes.append("all seeds have the same episodes: they count as one, not as several trainings")
     if board is not None and verdict.passed:
         copies = list(duplicates.copied_seeds(verdict.results, verdict.manifest["name"], board))
-        (verdict.notes if rerun else verdict.problems).extend(copies)
+        (verdict.notes if verdict.tier == "re-run" else verdict.problems).extend(copies)
 
 
 def _rerun(
-    folder: Path, seeds: Sequence[SeedCheck], verdict: Verdict, limits: Limits, threads: int, report: Progress
+    folder: Path,
+    seeds: Sequence[SeedCheck],
+    verdict: Verdict,
+    limits: Limits,
+    trust: bool,
+    threads: int,
+    report: Progress,
 ) -> None:
-    """Runs the agent of each seed again; removes its recorded episodes first, so that the agent cannot read them."""
+    """Runs the agent of each seed again; removes its recorded episodes first, so that the agent cannot read them.
+
+    Only a run in the sandbox gives the tier `re-run`: without it, the agent may read the splits and their experts.
+    """
     for run in seed_folders(folder):
         shutil.rmtree(run.path)
     for seed in seeds:
-        verdict.add(seed.rerun(limits, threads, report))
-    verdict.tier = "re-run" if verdict.passed else "replayed"
+        verdict.add(seed.rerun(limits, trust, threads, report))
     if not sandbox.is_available():
-        verdict.notes.append("bubblewrap is not installed: the agent ran with your rights, watched by a hook alone")
+        verdict.notes.append("the agent ran again without a sandbox, with your rights: its tier stays `replayed`")
+    elif verdict.passed:
+        verdict.tier = "re-run"

@@ -16,11 +16,22 @@ from dextron_bench.methods.isolation import sandbox
 from dextron_bench.methods.specs import AgentSpec
 
 
+class NoSandbox(AgentError):
+    """Code that is not trusted, on a machine without a sandbox."""
+
+    def __init__(self, spec: AgentSpec) -> None:
+        super().__init__(
+            f"{str(spec)!r} may come from a stranger and runs in a sandbox only: install bubblewrap "
+            "(docs/agents.md), or add --trust to run it with all your rights"
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class Launch:
     """How to start an agent's process: by its own command, or, if `command` is empty, by the Python worker.
 
     `spec` has absolute paths. `readable` are the files and folders that the process may read beside Python's own.
+    Code that is not `trusted` starts in the sandbox or not at all.
     """
 
     spec: AgentSpec
@@ -28,18 +39,27 @@ class Launch:
     settings: dict[str, Any] = field(default_factory=dict)
     weights: str = ""
     readable: tuple[str, ...] = ()
+    trusted: bool = True
 
     def command_line(self, scratch: str, memory: int) -> list[str]:
-        """The words of the whole command: sandbox, limits [bytes of memory], and the agent that writes to `scratch`."""
+        """The words of the whole command: sandbox, limits [bytes of memory], and the agent that writes to `scratch`.
+
+        Raises NoSandbox if the code is not trusted and there is no sandbox.
+        """
+        if not self.trusted and not sandbox.is_available():
+            raise NoSandbox(self.spec)
         request = json.dumps({**asdict(self), "scratch": scratch})
         worker = [sys.executable, "-P", "-m", "dextron_bench.methods.isolation.worker", request]
         return sandbox.wrap(self.command or worker, scratch, self.readable, memory)
 
 
-def prepare_launch(text: str, settings: dict[str, Any] | None = None, weights: Path | None = None) -> Launch:
+def prepare_launch(
+    text: str, settings: dict[str, Any] | None = None, weights: Path | None = None, trust: bool = False
+) -> Launch:
     """How to start the agent that a text names (see `methods.specs`).
 
-    `weights` is the file of a method that learns. Raises AgentError if the text names no agent or a file is missing.
+    `weights` is the file of a method that learns. Without `trust`, a policy's file (TorchScript, ONNX) starts in the
+    sandbox only, since nobody reads such a file before it runs. Raises AgentError if the text names no agent or a file is missing.
     """
     try:
         spec = specs.parse(text)
@@ -49,7 +69,7 @@ def prepare_launch(text: str, settings: dict[str, Any] | None = None, weights: P
         return _launch_command(spec)
     if spec.kind == "policy":
         file = _existing(spec.location)
-        return Launch(replace(spec, location=file), readable=(file,))
+        return Launch(replace(spec, location=file), readable=(file,), trusted=trust)
     code: list[str] = []
     if spec.kind == "file":
         spec = replace(spec, location=_existing(spec.location))

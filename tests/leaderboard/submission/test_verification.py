@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 
+from dextron_bench.methods.isolation import sandbox
 from tests.helpers.forged_bundles import Forgery, row
 
 
@@ -18,6 +20,19 @@ def test_a_valid_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forg
     assert verdict.notes[-1] == "all seeds have the same episodes: they count as one, not as several trainings"
     assert (verdict.tier, verdict.episodes, verdict.exact) == ("re-run", 8, 8)
     assert verdict.results[0]["splits"]["test"]["scores"] == [20.0, 20.0, 0.0]
+
+
+def test_without_a_sandbox_the_agent_runs_only_if_it_is_trusted_and_its_tier_stays_replayed(
+    forged: Forgery, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(sandbox, "is_available", lambda: False)
+    refused = forged.checked(rerun=True)
+    assert "runs in a sandbox only" in refused.problems[0]
+    assert refused.tier == "replayed"
+    trusted = forged.checked(rerun=True, trust=True)
+    assert trusted.problems == []
+    assert trusted.tier == "replayed"
+    assert "without a sandbox" in trusted.notes[0]
 
 
 def test_a_changed_reward_is_refused(forged: Forgery):

@@ -23,7 +23,7 @@ from dextron_bench.experts.policies import Case
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import policy_files, sandbox
 from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent, Limits
-from dextron_bench.methods.isolation.launch import prepare_launch
+from dextron_bench.methods.isolation.launch import NoSandbox, prepare_launch
 from dextron_bench.splits.loading import cases_from_frame
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.tiny_benchmark import ROWS
@@ -61,7 +61,7 @@ def agent_spec(tmp_path: Path) -> Callable[[str], str]:
 
 
 def play(spec: str, cases: list[Case] = CASES, **limits: float) -> list[Episode]:
-    with IsolatedAgent(prepare_launch(spec), limits=Limits(**limits)) as agent:  # pyright: ignore[reportArgumentType]
+    with IsolatedAgent(prepare_launch(spec, trust=True), limits=Limits(**limits)) as agent:  # pyright: ignore[reportArgumentType]
         episodes = dict(rollout(agent, SOURCE, cases, slots=2, threads=1))
     return [episodes[index] for index in range(len(cases))]
 
@@ -273,6 +273,44 @@ def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
         play(str(file))
     with pytest.raises(policy_files.BadPolicy, match=r"file ends in \.pt or \.onnx"):
         policy_files.load(tmp_path / "policy.pkl")
+
+
+class Writer(torch.nn.Module):
+    """Writes a file through a memory map; the path is a constant of the graph."""
+
+    def __init__(self, path: str) -> None:
+        super().__init__()
+        self.path = path
+
+    def forward(self, states: torch.Tensor) -> torch.Tensor:
+        torch.from_file(self.path, True, 10).fill_(1.0)
+        return states[:, :1] * 0.0
+
+
+@pytest.fixture
+def writer(tmp_path: Path) -> Path:
+    """A TorchScript policy that writes the file `stolen` beside itself."""
+    file = tmp_path / "policy.pt"
+    torch.jit.save(torch.jit.script(Writer(str(tmp_path / "stolen"))), str(file))
+    return file
+
+
+@pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
+def test_torchscript_that_writes_files_writes_none_in_the_sandbox(writer: Path):
+    play(str(writer), CASES[:1])
+    assert not writer.with_name("stolen").exists()
+
+
+@pytest.mark.parametrize("name", ["policy.pt", "policy.onnx"])
+def test_without_a_sandbox_no_policy_file_starts_unless_it_is_trusted(
+    name: str, writer: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(sandbox, "is_available", lambda: False)
+    file = writer.rename(writer.with_name(name))
+    with pytest.raises(NoSandbox, match="add --trust"), IsolatedAgent(prepare_launch(str(file))) as agent:
+        agent.act(np.zeros((1, 48)))
+    assert not writer.with_name("stolen").exists()
+    assert prepare_launch(str(file), trust=True).command_line("/", 2**30)[0] != "bwrap"
 
 
 def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):
