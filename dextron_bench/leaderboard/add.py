@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from dextron_bench.leaderboard import build, collect
-from dextron_bench.leaderboard.submission import bundle
+from dextron_bench.leaderboard.submission import bundle, names
 from dextron_bench.leaderboard.submission.entry import BadSubmission
 from dextron_bench.leaderboard.submission.verdict import Verdict
 from dextron_bench.methods import registry
@@ -18,14 +18,14 @@ from dextron_bench.storage.run_folder import RunFolder
 
 def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:
     """Raises BadSubmission if a submission must not use a name, or if it is on the board and `replace` is False."""
-    if not registry.NAME.fullmatch(name):
+    if not registry.NAME.fullmatch(name) or len(name) > 64:
         raise BadSubmission(f"{name!r} is not a valid name: use letters, digits and . _ + -, as in 'my-agent'")
     results = board / collect.RESULTS
-    rows = {place.name.casefold(): place for place in results.iterdir()} if results.exists() else {}
-    place = rows.get(name.casefold())
+    rows = {names.appearance(place.name): place for place in results.iterdir()} if results.exists() else {}
+    place = rows.get(names.appearance(name))
     taken = place is not None and (place.name != name or not list(place.glob(f"*/{bundle.MANIFEST}")))
-    if taken or name.casefold().split("-")[0] in registry.installed_methods():
-        raise BadSubmission(f"{name!r} equals or begins like the name of another row; submit it under another name")
+    if taken or names.imitated(name, registry.installed_methods()):
+        raise BadSubmission(f"{name!r} looks like the name of another row; submit it under another name")
     if place and (place / reaches).exists() and not replace:
         raise BadSubmission(f"{name!r} on {reaches} reaches is on the board; --replace replaces it")
 
