@@ -13,7 +13,7 @@ from dextron_bench.leaderboard import readme
 from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
-from dextron_bench.storage import atomic, provenance
+from dextron_bench.storage import atomic, provenance, schemas
 from dextron_bench.storage.printable import spreadsheet_cell
 from dextron_bench.storage.run_folder import run_folders
 from dextron_bench.world import model
@@ -93,7 +93,7 @@ def learning_curves(runs: Path, cloned: bool = False) -> dict[tuple[str, str], C
         if not run.curve.exists():
             continue
         result = result_files.read_result(run.result)
-        points = pd.DataFrame(atomic.read_json(run.curve)["points"])
-        if (result["training"]["frames"] is None) == cloned:
+        points = pd.DataFrame(schemas.read(run.curve, schemas.CURVE)["points"])
+        if ((result.get("training") or {}).get("frames") is None) == cloned:
             curves[result["method"], result["reaches"]][result["seed"]] = points
     return curves

@@ -11,7 +11,7 @@ from dextron_bench.methods import registry, specs, weights
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage import atomic, provenance
+from dextron_bench.storage import atomic, provenance, schemas
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
 
@@ -77,7 +77,7 @@ def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]
 
 def _ship_weights(run: RunFolder, result: dict[str, Any]) -> None:
     """Copies the weights of an installed learner to the folder of shipped weights; skips methods in a file."""
-    config = atomic.read_json(run.config)
+    config = schemas.read(run.config, schemas.METHOD_CONFIG)
     if config["code"]["sha256"] or specs.parse(config["code"]["class"]).kind != "module":
         return  # A config never makes the code of a file run.
     method = registry.create(config["code"]["class"], config["settings"])
