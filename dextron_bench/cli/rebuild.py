@@ -81,8 +81,9 @@ class Rebuild:
 
     def _fill_documents(self) -> int:
         from dextron_bench.leaderboard import documents
+        from dextron_bench.storage.folders import visible
 
-        files = [file for pattern in DOCUMENTS for file in sorted(Path().glob(pattern))]
+        files = [file for pattern in DOCUMENTS for file in visible(Path(), pattern)]
         for file in documents.fill(files, Path("leaderboard")):
             print(f"rebuild: numbers in {file}")
         return DONE
