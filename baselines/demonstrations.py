@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from safetensors.numpy import load_file, save_file
 
 from dextron_bench import Case, ExpertAgent, Track, rollout
-from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage import atomic, hashing, tensors
 from dextron_bench.world import model
 
 FORMAT = 1  # Version of the cached file.
+SHA256 = "sha256"  # Of the arrays, in the metadata of the file.
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +47,31 @@ class Demonstrations:
 
 
 def load(track: Track, episodes: int | None = None) -> Demonstrations:
-    """The experts' episodes on the first `episodes` cases of a track (default: all), played or from the cache."""
+    """The experts' episodes on the first `episodes` cases of a track (default: all), played or from the cache.
+
+    Raises DamagedFile.
+    """
     cases = track.cases[:episodes]
     file = track.cache / f"demonstrations-{_digest(cases)[:16]}.safetensors"
     if not file.exists():
         arrays = play(track, cases)
-        atomic.write_atomically(file, lambda part: save_file(arrays, part))
-    return Demonstrations(**load_file(file))
+        tensors.write(file, arrays, {SHA256: tensors.digest(arrays)})
+    return _stored(file, len(cases))
+
+
+def _stored(file: Path, episodes: int) -> Demonstrations:
+    """The episodes in a file of the cache; raises DamagedFile."""
+    try:
+        arrays, sha256 = tensors.read(file), tensors.read_about(file).get(SHA256)
+    except tensors.BadTensors as error:
+        raise atomic.DamagedFile(file, error) from error
+    if sha256 not in (None, tensors.digest(arrays)):  # A file of an earlier version has no SHA-256.
+        raise atomic.DamagedFile(file, "its values differ from the digest that it carries")
+    rows = len(arrays["states"]) if "states" in arrays else 0
+    shapes = {"states": (rows, model.STATE), "actions": (rows,), "rewards": (rows,), "starts": (episodes + 1,)}
+    if {name: array.shape for name, array in arrays.items()} != shapes or arrays["starts"][-1] != rows:
+        raise atomic.DamagedFile(file, f"it does not hold {episodes} episodes")
+    return Demonstrations(**arrays)
 
 
 def play(track: Track, cases: Sequence[Case]) -> dict[str, np.ndarray]:

@@ -14,6 +14,7 @@ import tyro
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import progress_bar
 from dextron_bench.reaches.sources import SourceName
+from dextron_bench.storage.printable import printable
 
 if TYPE_CHECKING:
     from dextron_bench.leaderboard.submission.verdict import Verdict
@@ -70,9 +71,10 @@ class Verify:
         for row in verify_board.rows(self.board, self.method, self.reaches):
             with progress_bar(row.name, self.quiet) as progress:
                 finding = verify_board.check(row, self.rows, self.threads, progress)
-            print(f"{row.name}: {finding.done if not finding.problems else 'DIFFERS from its episodes'}", flush=True)
+            done = finding.done if not finding.problems else "DIFFERS from its episodes"
+            print(printable(f"{row.name}: {done}"), flush=True)
             for problem in finding.problems[:SHOWN]:
-                print(f"  {problem}")
+                print(f"  {printable(problem)}")
             sound &= not finding.problems
             if self.stamp and verify_board.stamp(row, finding):
                 print("  its tier is now `re-run`")
@@ -140,9 +142,9 @@ def print_verdict(verdict: Verdict) -> int:
     """Prints the result of a verification and returns the exit code."""
     name = f"{verdict.manifest['name']} on {verdict.manifest['reaches']} reaches"
     for note in verdict.notes:
-        print(f"note: {note}")
+        print(printable(f"note: {note}"))
     if verdict.passed:
         print(f"{name}: {verdict.tier}; {verdict.exact} of {verdict.episodes} episodes equal bit for bit")
         return DONE
-    print(f"{name}: refused", *verdict.problems, sep="\n  ")
+    print(f"{name}: refused", *map(printable, verdict.problems), sep="\n  ")
     return DIFFERS

@@ -17,6 +17,7 @@ import tyro
 from dextron_bench.cli import method_flags
 from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
+from dextron_bench.storage.printable import printable
 
 BLAS = "OPENBLAS_NUM_THREADS"  # NumPy's products are small here, so more threads would mostly wait for each other.
 PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
@@ -35,6 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = [word for word in words if word != "--debug"]
     if words == ["--version"]:
         return _print_version()
+    if broken := [word for word in words if not _is_utf8(word)]:
+        print(f"dextron-bench: {broken[0]!a} is not valid UTF-8; rename the file or folder", file=sys.stderr)
+        return USAGE
     try:
         code = _parse(words)()
         sys.stdout.flush()
@@ -46,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if debug:
             raise
         code, message = explain(error)
-        print(f"dextron-bench: {message}", file=sys.stderr)
+        print(f"dextron-bench: {printable(message)}", file=sys.stderr)
         return code
 
 
@@ -60,6 +64,15 @@ def _limit_blas_threads() -> None:
     threadpoolctl.threadpool_limits(1, user_api="blas")  # For NumPy's, which `import dextron_bench` has loaded.
 
 
+def _is_utf8(text: str) -> bool:
+    """False for an argument with bytes that Python could not decode, and kept as surrogates."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def explain(error: BaseException) -> tuple[int, str]:
     """The exit code and the line on stderr for an error that ended a command."""
     text = " ".join(str(error.args[0] if isinstance(error, KeyError) and error.args else error).split())
@@ -67,6 +80,8 @@ def explain(error: BaseException) -> tuple[int, str]:
         return INTERRUPTED, "interrupted"
     if type(error).__module__.split(".")[0] in PACKAGES:
         return USAGE, text
+    if isinstance(error, UnicodeEncodeError):  # Of a name on the disk; arguments are checked before.
+        return USAGE, f"{error.object!a} is not valid UTF-8; rename the file or folder"
     if isinstance(error, OSError):
         reason = error.strerror or text
         return USAGE, f"{reason}: {error.filename}" if error.filename else reason

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from dextron_bench.storage.printable import printable
 from dextron_bench.storage.progress import Progress, no_progress
 
 WIDTH = 1000  # Columns of a table that is not printed on a terminal, so that no cell is folded.
@@ -25,7 +26,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[obje
         numbers = all(isinstance(row[index], (int, float)) for row in rows)
         table.add_column(column, justify="right" if numbers else "left", overflow="fold")
     for row in rows:
-        table.add_row(*(f"{cell:.3f}" if isinstance(cell, float) else str(cell) for cell in row))
+        table.add_row(*(f"{cell:.3f}" if isinstance(cell, float) else printable(str(cell)) for cell in row))
     console = Console(width=None if sys.stdout.isatty() else WIDTH, soft_wrap=not sys.stdout.isatty(), markup=False)
     with console.capture() as captured:  # Rich would end the process if the reader of a pipe has left.
         console.print(table)

@@ -81,8 +81,9 @@ class Rebuild:
 
     def _fill_documents(self) -> int:
         from dextron_bench.leaderboard import documents
+        from dextron_bench.storage.folders import visible
 
-        files = [file for pattern in DOCUMENTS for file in sorted(Path().glob(pattern))]
+        files = [file for pattern in DOCUMENTS for file in visible(Path(), pattern)]
         for file in documents.fill(files, Path("leaderboard")):
             print(f"rebuild: numbers in {file}")
         return DONE
@@ -97,13 +98,13 @@ def _chosen(names: Iterable[str]) -> list[Step]:
 
 def _state(step: Step) -> str:
     """`fresh`, `stale`, or `missing` if the step was never done here."""
-    from dextron_bench.storage import atomic
+    from dextron_bench.storage import schemas
 
     if not _entry_file(step).exists():
         return "missing"
     return (
         "fresh"
-        if atomic.read_json(_entry_file(step)) == {"inputs": _inputs(step), "outputs": _outputs(step)}
+        if schemas.read(_entry_file(step), schemas.STEP) == {"inputs": _inputs(step), "outputs": _outputs(step)}
         else "stale"
     )
 
@@ -128,14 +129,17 @@ def _outputs(step: Step) -> dict[str, str]:
 
 def _hashes(patterns: Iterable[str]) -> dict[str, str]:
     from dextron_bench.storage import hashing
+    from dextron_bench.storage.folders import visible
 
-    files = {file for pattern in patterns for file in Path().glob(pattern) if file.is_file()}
+    files = {file for pattern in patterns for file in visible(Path(), pattern) if file.is_file()}
     return {file.as_posix(): hashing.sha256(file) for file in sorted(files)}
 
 
 def _expanded(word: str) -> Iterator[str]:
     """The files that a pattern names; any other word unchanged."""
-    yield from (map(str, sorted(Path().glob(word))) if "*" in word else [word])
+    from dextron_bench.storage.folders import visible
+
+    yield from (map(str, visible(Path(), word)) if "*" in word else [word])
 
 
 def _entry_file(step: Step) -> Path:

@@ -21,7 +21,8 @@ SHORT = 12  # Hexadecimal digits of each hash of actions in a result.
 class Episode:
     """One rollout: states (T + 1, 48), actions (T, 1), rewards (T,), float64, and how it ended.
 
-    `failure` is empty, or says what the agent did wrong; an episode with a failure ends there and scores 0.
+    `failure` is empty, or says what the agent did wrong or that the simulation diverged; an episode with a failure ends
+    before that step and scores 0.
     """
 
     setting: Setting

@@ -11,7 +11,7 @@ from dextron_bench.experts.policies import Case
 from dextron_bench.methods.agents import Agent, AgentCrashed, AgentError, Privileged, as_agent_error
 from dextron_bench.reaches.setting import Source
 from dextron_bench.world import model, task
-from dextron_bench.world.engine import Engine, Step
+from dextron_bench.world.engine import DIVERGED, Engine, Step
 
 SLOTS = 256  # Episodes at once. Fixed, because the last bits of an agent's actions may depend on the batch size.
 
@@ -22,7 +22,8 @@ def rollout(
     """Plays every case once; yields (index of the case, episode) in the order in which episodes end.
 
     Raises AgentError if the agent raises an exception or returns actions of a wrong shape. An action that is not finite
-    or lies outside [-1, 1] fails its own episode only; AgentCrashed fails all current episodes.
+    or lies outside [-1, 1] fails its own episode only, and so does a simulation that diverges; AgentCrashed fails all
+    current episodes.
     """
     return _Evaluation(agent, source, cases, Engine(min(slots, max(len(cases), 1)), threads)).run()
 
@@ -55,10 +56,11 @@ class _Evaluation:
             valid, invalid = live[is_valid], live[~is_valid]
             step = self._engine.step(valid, actions[valid])
             self._store(valid, actions[valid], step)
-            ended = np.flatnonzero(step.ended)
+            ended = np.flatnonzero(step.ended & ~step.diverged)
             yield from [self._episode(valid[i], bool(step.terminated[i]), bool(step.truncated[i])) for i in ended]
+            yield from [self._episode(slot, failure=DIVERGED) for slot in valid[step.diverged]]
             yield from [self._episode(slot, failure=describe_fault(actions[slot, 0])) for slot in invalid]
-            self._refill(np.union1d(valid[ended], invalid))
+            self._refill(np.union1d(valid[step.ended], invalid))
 
     def _ask(self) -> np.ndarray:
         with as_agent_error("the agent's act()"):
@@ -88,9 +90,12 @@ class _Evaluation:
             self._agent.reset(slots)
 
     def _store(self, slots: np.ndarray, actions: np.ndarray, step: Step) -> None:
+        """Stores a step of slots (n,) with actions (n, 1); a step that diverged is no part of its episode."""
+        sound = ~step.diverged
+        slots = slots[sound]
         at = self._length[slots]
-        self._actions[slots, at], self._rewards[slots, at] = actions, step.rewards
-        self._states[slots, at + 1] = self._now[slots] = step.states
+        self._actions[slots, at], self._rewards[slots, at] = actions[sound], step.rewards[sound]
+        self._states[slots, at + 1] = self._now[slots] = step.states[sound]
         self._length[slots] += 1
 
     def _episode(

@@ -8,7 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench.storage import atomic, folder_config
+from dextron_bench.storage import folder_config, schemas, tables
+from dextron_bench.storage.folders import visible
 from dextron_bench.world import model, task
 
 SEARCH = "search.json"  # The search that the folder belongs to.
@@ -16,7 +17,10 @@ KEPT = 1.0  # Rows with a sum of rewards above this are kept (paper, II.C).
 
 
 class DamagedBlock(ValueError):
-    """A block of a search that cannot be read."""
+    """A block of a search that cannot be used; the message names it and says what to do."""
+
+    def __init__(self, file: Path, why: object) -> None:
+        super().__init__(f"{file} is damaged ({why}); remove it and search again")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,12 +42,12 @@ def write_or_check(search: dict[str, Any], folder: Path) -> None:
 def read_config(folder: Path) -> dict[str, Any]:
     """The search that a folder holds, and the hash of its physics; empty if it holds none."""
     file = folder / SEARCH
-    return atomic.read_json(file) if file.exists() else {}
+    return schemas.read(file, schemas.SEARCH) if file.exists() else {}
 
 
 def write(folder: Path, number: int, draws: pd.DataFrame) -> None:
     """Writes the file of a block atomically."""
-    atomic.write_atomically(block_file(folder, number), lambda part: draws.to_parquet(part, compression="zstd"))
+    tables.write(block_file(folder, number), draws, compression="zstd")
 
 
 def block_file(folder: Path, number: int) -> Path:
@@ -53,16 +57,24 @@ def block_file(folder: Path, number: int) -> Path:
 
 def update_tallies(folder: Path, done: dict[int, Tally]) -> dict[int, Tally]:
     """The tallies of all blocks in the folder; reads only the blocks that are not in `done`."""
-    stored = sorted(int(file.stem) for file in (folder / "blocks").glob("[0-9]*.parquet"))
+    stored = [int(file.stem) for file in visible(folder / "blocks", "[0-9]*.parquet") if file.stem.isdecimal()]
     return {number: done.get(number) or _tally(read(block_file(folder, number))) for number in stored}
 
 
 def read(file: Path) -> pd.DataFrame:
     """A block's draws with their outcomes; raises DamagedBlock."""
     try:
-        return pd.read_parquet(file)
-    except (OSError, ValueError) as error:
-        raise DamagedBlock(f"{file} is damaged ({error}); remove it and search again") from error
+        return tables.read(file, tables.DRAWS)
+    except tables.BadTable as error:
+        raise DamagedBlock(file, error) from error
+
+
+def check(file: Path, block: pd.DataFrame, draws: pd.DataFrame) -> None:
+    """Raises DamagedBlock if a block does not hold exactly these draws, in their order."""
+    if len(block) != len(draws):
+        raise DamagedBlock(file, f"it has {len(block)} rows, and a block of this search has {len(draws)}")
+    if differing := [name for name in draws if (block[name].to_numpy() != draws[name].to_numpy()).any()]:
+        raise DamagedBlock(file, f"its column {differing[0]!r} differs from the draws of this search")
 
 
 def total(done: dict[int, Tally]) -> Tally:

@@ -13,7 +13,8 @@ from dextron_bench.leaderboard import readme
 from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
-from dextron_bench.storage import atomic, provenance
+from dextron_bench.storage import atomic, provenance, schemas
+from dextron_bench.storage.printable import spreadsheet_cell
 from dextron_bench.storage.run_folder import run_folders
 from dextron_bench.world import model
 
@@ -39,7 +40,8 @@ def build(board: Path) -> list[Path]:
     rows = standings.table(results)
     table = _with_origin(rows, results)
     files = [board / "table.csv", board / "README.md", board / "table.json"]
-    atomic.write_atomically(files[0], lambda part: table.to_csv(part, index=False, float_format="%.6g"))
+    spreadsheet = table.map(lambda value: spreadsheet_cell(value) if isinstance(value, str) else value)
+    atomic.write_atomically(files[0], lambda part: spreadsheet.to_csv(part, index=False, float_format="%.6g"))
     atomic.write_atomically(files[2], lambda part: table.to_json(part, orient="records", indent=1))
     curves = _curves_by_source(board / RESULTS)
     readme.insert(files[1], "\n".join(readme.sections(table, set(curves))))
@@ -91,7 +93,7 @@ def learning_curves(runs: Path, cloned: bool = False) -> dict[tuple[str, str], C
         if not run.curve.exists():
             continue
         result = result_files.read_result(run.result)
-        points = pd.DataFrame(atomic.read_json(run.curve)["points"])
-        if (result["training"]["frames"] is None) == cloned:
+        points = pd.DataFrame(schemas.read(run.curve, schemas.CURVE)["points"])
+        if ((result.get("training") or {}).get("frames") is None) == cloned:
             curves[result["method"], result["reaches"]][result["seed"]] = points
     return curves

@@ -11,7 +11,7 @@ from dextron_bench.methods import registry, specs, weights
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage import atomic, provenance
+from dextron_bench.storage import atomic, provenance, schemas
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
 
@@ -36,12 +36,15 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
         result = result_files.read_result(run.result)
         if provenance.physics_of(result) != model.mjcf_hash() or not _is_complete(result):
             continue
+        config = schemas.read(run.config, schemas.METHOD_CONFIG)
+        if run.curve.exists():
+            schemas.read(run.curve, schemas.CURVE)  # What is damaged is not copied.
         copy = RunFolder(board / RESULTS / run.path.relative_to(runs))
         before = result_files.read_result(copy.result) if copy.result.exists() else {}
         atomic.write_json(copy.result, _with_tier(result, before))
         if run.curve.exists():
             _copy(run.curve, copy.curve)
-        _ship_weights(run, result)
+        _ship_weights(run, result, config)
         taken.append(copy.path)
     if not taken:
         raise NothingToPublish(
@@ -75,9 +78,8 @@ def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]
     return scores, (result.get("training") or {}).get("sha256")
 
 
-def _ship_weights(run: RunFolder, result: dict[str, Any]) -> None:
+def _ship_weights(run: RunFolder, result: dict[str, Any], config: dict[str, Any]) -> None:
     """Copies the weights of an installed learner to the folder of shipped weights; skips methods in a file."""
-    config = atomic.read_json(run.config)
     if config["code"]["sha256"] or specs.parse(config["code"]["class"]).kind != "module":
         return  # A config never makes the code of a file run.
     method = registry.create(config["code"]["class"], config["settings"])

@@ -19,6 +19,7 @@ from dextron_bench.recording import Recording, read_safely, summarise
 from dextron_bench.runs import rerecording, selection
 from dextron_bench.splits.loading import Split, known_splits, load_split
 from dextron_bench.storage import atomic
+from dextron_bench.storage.folders import visible
 from dextron_bench.success import exemplars, network
 from dextron_bench.success.exemplars import EXPERT, PredictedEpisode
 
@@ -80,7 +81,7 @@ def make(chosen: pd.DataFrame, into: Path) -> list[Path]:
 def published(folder: Path) -> list[Shown]:
     """The undamaged recordings in a folder whose names `recordings choose` gave, sorted by name."""
     shown = []
-    for summary in summarise(sorted(folder.glob("*.rrd"))):
+    for summary in summarise(visible(folder, "*.rrd")):
         kind = _kind(summary.file.stem)
         if kind and not summary.damage:
             properties = summary.properties

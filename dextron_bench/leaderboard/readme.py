@@ -11,6 +11,7 @@ from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.scores import cells
 from dextron_bench.splits.loading import SPLIT_NAMES
 from dextron_bench.storage import atomic
+from dextron_bench.storage.printable import printable
 from dextron_bench.world import model
 
 BEGIN, END = "<!-- made by `dextron-bench leaderboard build`: -->", "<!-- end of what was made -->"
@@ -71,4 +72,4 @@ def _score(row: cells.Row) -> str:
 
 
 def _line(values: Iterable[object]) -> str:
-    return "| " + " | ".join(map(str, values)) + " |"
+    return "| " + " | ".join(printable(str(value)).replace("|", "\\|") for value in values) + " |"

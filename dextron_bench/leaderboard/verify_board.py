@@ -18,7 +18,8 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder, seed_folders
 
@@ -82,7 +83,7 @@ def differing_files(board: Path) -> list[str]:
         if (recordings := board.resolve().parent / FOLDER).exists():
             (Path(folder) / FOLDER).symlink_to(recordings)  # The page lists the recordings beside the board.
         build.build(copy)
-        built = [file for file in sorted(copy.iterdir()) if file.suffix in BUILT]
+        built = [file for file in visible(copy, "*") if file.suffix in BUILT]
         return [f"{file.name} differs" for file in built if not _same(file, board / file.name)]
 
 
@@ -94,7 +95,7 @@ def _replay(row: Row, threads: int, report: Progress) -> Finding:
     if faults := list(episode_tables.faults(table, splits)):
         return Finding("", faults)
     replayed = replay_check.replay_table(sources.open_source(reaches), splits, table, threads, report)
-    manifest = atomic.read_json(row.run.path.parent / bundle.MANIFEST)
+    manifest = schemas.read(row.run.path.parent / bundle.MANIFEST, schemas.MANIFEST)
     claims = [row.result.get(name) for name in ("method", "reaches", "declared")]
     if claims != [manifest.get(name) for name in ("name", "reaches", "declared")]:
         return Finding("", ["its name, reaches or declarations differ from its manifest"])

@@ -12,6 +12,7 @@ from dextron_bench.methods import registry
 from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.storage import hashing, tensors
+from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
 METADATA = ("label", "reaches", "seeds", "epochs", "best_epoch", "frames")  # What a result copies from its weights.
@@ -32,21 +33,21 @@ def shipped_folder(learner: Learner, reaches: str) -> Path:
 
 def shipped(learner: Learner, reaches: str) -> dict[int, Path]:
     """The files of a method's shipped weights for a source of reaches, by seed, sorted."""
-    paths = shipped_folder(learner, reaches).glob("seed*.safetensors")
+    paths = visible(shipped_folder(learner, reaches), "seed*.safetensors")
     files = {file.stem.removeprefix("seed"): file for file in paths}
     return {int(seed): files[seed] for seed in sorted(files, key=lambda s: (len(s), s)) if seed.isdigit()}
 
 
 def shipped_labels(learner: Learner, reaches: str) -> list[str]:
     """Labels of all weights for a source of reaches that ship in the same package as a method, sorted."""
-    return sorted(folder.parent.name for folder in shipped_folder(learner, reaches).parents[1].glob(f"*/{reaches}"))
+    return sorted(folder.parent.name for folder in visible(shipped_folder(learner, reaches).parents[1], f"*/{reaches}"))
 
 
 def all_shipped(reaches: str) -> list[Path]:
     """The files of all weights for a source of reaches that ship in the packages of installed methods, sorted."""
     methods = [registry.create(name) for name in registry.installed_methods()]
     folders = {shipped_folder(method, reaches).parents[1] for method in methods if isinstance(method, Learner)}
-    return sorted(file for folder in folders for file in folder.glob(f"*/{reaches}/seed*.safetensors"))
+    return sorted(file for folder in folders for file in visible(folder, f"*/{reaches}/seed*.safetensors"))
 
 
 def metadata(file: Path) -> dict[str, Any]:

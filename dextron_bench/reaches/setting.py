@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import numbers
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Protocol
@@ -12,16 +14,40 @@ import pandas as pd
 from dextron_bench.reaches.reach import Path, Reach, path, scaled_duration
 
 OFFSET = 0.06  # [m] offsets are uniform in [-OFFSET, OFFSET] (table I).
+LIMITS = {"offset_x": 1.0, "offset_y": 1.0, "duration_noise": 10.0}  # Largest sizes [m, m, standard deviations].
+
+
+class SettingError(ValueError):
+    """A value is not a setting; the message names the value and the valid ones."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """Everything random about one episode: the reach, the offset of its grasp from the bottle, its duration noise."""
+    """Everything random about one episode: the reach, the offset of its grasp from the bottle, its duration noise.
+
+    Raises SettingError unless the reach is a name and every number lies within LIMITS. No draw reaches these limits:
+    a noise of 10 makes a reach 8 s longer, and an episode lasts at most 10 s.
+    """
 
     reach: str
     offset_x: float  # [m]
     offset_y: float  # [m]
     duration_noise: float  # standard normal
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.reach, str):
+            raise SettingError(f"the reach of a setting must be a name; got {self.reach!r}")
+        for name, limit in LIMITS.items():
+            value = getattr(self, name)
+            if not isinstance(value, numbers.Real) or not math.fabs(value) <= limit:  # This form also refuses NaN.
+                raise SettingError(f"{name} of a setting must be a number in [-{limit:g}, {limit:g}]; got {value!r}")
+
+
+def checked_setting(value: object) -> Setting:
+    """The value, if it is a setting; raises SettingError."""
+    if not isinstance(value, Setting):
+        raise SettingError(f"a setting must be a dextron_bench Setting; got {value!r}")
+    return value
 
 
 class UnknownReach(KeyError):

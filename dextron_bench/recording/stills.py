@@ -12,6 +12,7 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.reaches.setting import Setting
+from dextron_bench.storage import atomic
 from dextron_bench.world import model
 from dextron_bench.world.rendering import renderer
 
@@ -32,7 +33,8 @@ def write_pictures(folder: Path) -> list[Path]:
         "hand-open-half-closed.png": np.concatenate(hands, axis=1),
     }
     for name, picture in pictures.items():
-        Image.fromarray(picture).save(folder / name, optimize=True)
+        image = Image.fromarray(picture)
+        atomic.write_atomically(folder / name, lambda part, image=image: image.save(part, "PNG", optimize=True))
     return [folder / name for name in pictures]
 
 

@@ -16,7 +16,7 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import from_frame
 from dextron_bench.runs import recording_files, selection
 from dextron_bench.splits.loading import load_split
-from dextron_bench.storage import atomic
+from dextron_bench.storage import schemas
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
@@ -72,7 +72,7 @@ def _check_playable(row: dict[Any, Any], fault: str) -> None:
             f"{name} {problem}, and its actions were not kept; remove {run.episodes} and {advice}: "
             "it plays the episodes again and trains nothing"
         )
-    if atomic.read_json(run.config).get("physics") != model.mjcf_hash():
+    if schemas.read(run.config, schemas.CONFIG).get("physics") != model.mjcf_hash():
         raise Unplayable(f"{name} was played with other physics than this version's; remove {run.path} and {advice}")
     if load_split(row["reaches"], row["split"]).digest != row["digest"]:
         raise Unplayable(f"{name} is of an older version of the split; {advice}")

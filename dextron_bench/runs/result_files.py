@@ -11,7 +11,8 @@ import pandas as pd
 
 from dextron_bench.evaluation.episodes import action_hashes
 from dextron_bench.methods.registry import NAME
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import RunFolder, run_folders, seed_folders
 
 MAKER = ("method", "code", "settings")  # Entries of the config in the result; with them the agent can be made again.
@@ -27,7 +28,8 @@ def write_result(folder: RunFolder, table: pd.DataFrame, about: dict[str, Any], 
 
     `seconds` of training belong to the provenance, since they differ each time.
     """
-    config, provenance = atomic.read_json(folder.config), atomic.read_json(folder.provenance)
+    config = schemas.read(folder.config, schemas.CONFIG)
+    provenance = schemas.read(folder.provenance, schemas.PROVENANCE)
     provenance |= {} if seconds is None else {"seconds": seconds}
     maker = {name: config[name] for name in MAKER if name in config}
     result = {**about, "splits": scores_by_split(table), "provenance": provenance, "maker": maker}
@@ -63,14 +65,7 @@ def finished(runs: Path, label: str = "*") -> list[RunFolder]:
 
 def read_result(file: Path) -> dict[str, Any]:
     """The content of a `result.json`; raises DamagedFile."""
-    result = atomic.read_json(file)
-    try:
-        parts = [result["method"], result["reaches"], result["seed"]]
-        for split in result["splits"].values():
-            parts += [split["digest"][:8], sum(split["scores"]), split["failed"], sum(split["causes"].values())]
-    except (KeyError, TypeError, AttributeError) as error:
-        raise atomic.DamagedFile(file, f"no result: {type(error).__name__} {error}") from error
-    return result
+    return schemas.read(file, schemas.RESULT)
 
 
 def published_results() -> Path:
@@ -108,7 +103,7 @@ def _files(name: str, runs: Path) -> list[Path]:
     depths = (
         [RunFolder(path)],
         seed_folders(path),
-        [run for place in sorted(path.glob("*")) for run in seed_folders(place)],
+        [run for place in visible(path, "*") for run in seed_folders(place)],
     )
     return next(filter(None, ([run.result for run in depth if run.result.exists()] for depth in depths)), [])
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage import atomic, hashing, tables
 from dextron_bench.storage.folder_config import RUN_ADVICE, FolderMismatch
 from dextron_bench.storage.run_folder import RunFolder
 
@@ -20,16 +20,16 @@ def stored_episodes(folder: RunFolder, splits: Sequence[Split]) -> pd.DataFrame:
     if not file.exists():
         return pd.DataFrame()
     try:
-        table = pd.read_parquet(file)
-        digests = table["split"].map({split.name: split.digest for split in splits})
-        return table[digests.isna() | (digests == table["digest"])]
-    except (OSError, ValueError, KeyError) as error:
+        table = tables.read(file, tables.EPISODES)
+    except tables.BadTable as error:
         raise atomic.DamagedFile(file, error) from error
+    digests = table["split"].map({split.name: split.digest for split in splits})
+    return table[digests.isna() | (digests == table["digest"])]
 
 
 def store_episodes(folder: RunFolder, table: pd.DataFrame) -> None:
     """Replaces the table of episodes of a run."""
-    atomic.write_atomically(folder.episodes, lambda part: table.to_parquet(part))
+    tables.write(folder.episodes, table)
 
 
 def copy_weights(file: Path, folder: RunFolder) -> Path:

@@ -11,7 +11,8 @@ import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.runs import recording_files, result_files, run_files
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import RunFolder, below
 
 LIMIT = 5  # Episodes that are selected if the filter names no number.
@@ -55,7 +56,7 @@ def recordings(places: Sequence[Path]) -> list[Path]:
     for place in places:
         if not place.exists():
             raise NoEpisodes(f"{place} does not exist; `dextron-bench run --record 3` makes recordings, in runs")
-        place_files = [place] if place.is_file() else sorted(file for file in place.glob("**/*.rrd") if file.is_file())
+        place_files = [place] if place.is_file() else [file for file in visible(place, "**/*.rrd") if file.is_file()]
         if not place_files:
             raise NoEpisodes(f"no recordings at {place}; make some with `dextron-bench run --record 3`")
         files |= dict.fromkeys(place_files)
@@ -87,7 +88,7 @@ def run_identity(run: RunFolder) -> dict[str, Any]:
     if run.result.exists():
         content = result_files.read_result(run.result)
     else:  # The run is not finished; its path has the label.
-        content = atomic.read_json(run.config) | {"method": run.label}
+        content = schemas.read(run.config, schemas.CONFIG) | {"method": run.label}
     try:
         return {name: content[name] for name in ("method", "reaches", "seed")}
     except KeyError as error:

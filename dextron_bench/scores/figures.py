@@ -18,6 +18,7 @@ from matplotlib.patches import Circle
 from mpl_toolkits.mplot3d import Axes3D
 
 from dextron_bench.reaches.setting import Setting, Source, Stratum, from_frame
+from dextron_bench.storage import atomic
 
 if TYPE_CHECKING:
     from dextron_bench.scores.comparison import Comparison
@@ -194,10 +195,15 @@ def inline(draw: Callable[[Path], None]) -> str:
 
 
 def _save(figure: Figure, file: Path, dpi: int) -> None:
-    """Writes a figure so that equal figures give equal bytes."""
-    date = DATES.get(file.suffix.lower())
+    """Writes a figure atomically; equal figures give equal bytes."""
+    suffix = file.suffix.lower()
+    metadata: Any = {DATES[suffix]: None} if suffix in DATES else None
+
+    def write(part: Path) -> None:
+        figure.savefig(part, dpi=dpi, metadata=metadata, format=suffix.removeprefix("."))
+
     with rc_context({"svg.hashsalt": "dextron-bench"}):
-        figure.savefig(file, dpi=dpi, metadata={date: None} if date else None)
+        atomic.write_atomically(file, write)
 
 
 def _check_format(file: Path) -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
+
+PART = ".part"  # Ending of the names of files and folders that are not complete; these names start with a dot.
 
 
 class DamagedFile(ValueError):
@@ -19,17 +22,44 @@ class DamagedFile(ValueError):
 def write_atomically(file: Path, write: Callable[[Path], object]) -> None:
     """Calls `write` on a temporary file, then replaces `file` with it in one step.
 
-    If the process dies at any moment, `file` holds its old content or its new content. Errors leave no temporary file.
+    If the process dies at any moment, `file` holds its old content or its new content. Errors leave no temporary file;
+    the temporary file of a process that was killed is removed at the next write of the same file. Raises OSError that
+    names the file.
     """
-    file.parent.mkdir(parents=True, exist_ok=True)
-    temporary = file.with_name(f".{file.name}.{os.getpid()}.part")
+    with naming(file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        _remove_abandoned(file)
+        temporary = file.with_name(f".{file.name}.{os.getpid()}{PART}")
+        try:
+            write(temporary)
+            with temporary.open("rb+") as content:
+                os.fsync(content.fileno())
+            os.replace(temporary, file)
+            sync(file.parent)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+def sync(path: Path) -> None:
+    """Writes a file, or the names in a folder, to the disk, so that they survive a power failure."""
+    if os.name != "posix":  # Elsewhere a folder cannot be opened.
+        return
+    descriptor = os.open(path, os.O_RDONLY)
     try:
-        write(temporary)
-        with temporary.open("rb+") as content:
-            os.fsync(content.fileno())
-        os.replace(temporary, file)
+        os.fsync(descriptor)
     finally:
-        temporary.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+@contextmanager
+def naming(file: Path) -> Iterator[None]:
+    """Adds the file to an OSError that names none, as a full disk raises it."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None:
+            error.filename = str(file)
+        raise
 
 
 def write_json(file: Path, value: Any) -> None:
@@ -39,11 +69,39 @@ def write_json(file: Path, value: Any) -> None:
 
 
 def read_json(file: Path) -> dict[str, Any]:
-    """Reads a JSON object from a file; raises DamagedFile."""
+    """Reads a JSON object from a file; raises DamagedFile. `schemas.read` also checks its content."""
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
         raise DamagedFile(file, error) from error
     if not isinstance(content, dict):
         raise DamagedFile(file, "it does not hold a JSON object")
     return content
+
+
+def _refuse(constant: str) -> NoReturn:
+    raise ValueError(f"{constant} is no JSON number")
+
+
+def _remove_abandoned(file: Path) -> None:
+    """Removes temporary files of this file whose processes have ended."""
+    start = f".{file.name}."
+    with os.scandir(file.parent) as entries:
+        names = [entry.name for entry in entries if entry.name.startswith(start) and entry.name.endswith(PART)]
+    for name in names:
+        process = name.removeprefix(start).removesuffix(PART)
+        if process.isdecimal() and not _is_alive(int(process)):
+            file.with_name(name).unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    """False if no process has this number; True if that is not known."""
+    if os.name != "posix":  # On Windows, signal 0 would end the process.
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True

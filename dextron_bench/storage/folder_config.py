@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.storage import atomic, provenance
+from dextron_bench.storage import atomic, provenance, schemas
 from dextron_bench.storage.run_folder import RunFolder
 
 RUN_ADVICE = "remove it, or choose another folder with --runs"
@@ -47,7 +47,7 @@ def write_or_check_file(file: Path, config: Mapping[str, Any], content: str, adv
 def _check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
     if not file.exists():
         return
-    stored, expected = atomic.read_json(file), json.loads(json.dumps(config))
+    stored, expected = schemas.read(file, schemas.OBJECT), json.loads(json.dumps(config))
     if names := list(_differences(stored, expected)):
         raise FolderMismatch(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")
 

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from dextron_bench.storage.folders import visible
+
 SEED = "seed"  # The folder of seed 3 is `seed3`.
 
 
@@ -95,14 +97,14 @@ def source_folder(runs: Path, label: str, reaches: str) -> Path:
 
 def run_folders(runs: Path, label: str = "*") -> list[RunFolder]:
     """All run folders below a folder of runs, sorted; `label` selects one method."""
-    return sorted(RunFolder(path) for path in runs.glob(f"{label}/*/{SEED}*"))
+    return sorted(RunFolder(path) for path in visible(runs, f"{label}/*/{SEED}*"))
 
 
 def seed_folders(parent: Path) -> list[RunFolder]:
     """The run folders of all seeds in a folder, sorted."""
-    return sorted(RunFolder(path) for path in parent.glob(f"{SEED}*"))
+    return sorted(RunFolder(path) for path in visible(parent, f"{SEED}*"))
 
 
 def below(place: Path, name: str) -> Iterator[RunFolder]:
     """Run folders at or below a place that hold a file of this name, sorted."""
-    return (RunFolder(file.parent) for file in sorted(place.glob(f"**/{name}")))
+    return (RunFolder(file.parent) for file in visible(place, f"**/{name}"))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from safetensors.numpy import load, save
 
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, hashing
 
 ABOUT = "about"  # The only key of a file's metadata: several keys would have no fixed order.
 DTYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
@@ -31,6 +31,12 @@ def write(file: Path, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]
         {ABOUT: json.dumps(about, sort_keys=True)},
     )
     atomic.write_atomically(file, lambda part: part.write_bytes(content))
+
+
+def digest(arrays: Mapping[str, np.ndarray]) -> str:
+    """SHA-256 of names, types, shapes and values of arrays."""
+    parts = ((name, np.asarray(arrays[name], order="C")) for name in sorted(arrays))
+    return hashing.digest(*(p for name, a in parts for p in (f"{name} {a.dtype.str} {a.shape}".encode(), a.tobytes())))
 
 
 def read(file: Path) -> dict[str, np.ndarray]:

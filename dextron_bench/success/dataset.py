@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.storage import atomic, tensors
+from dextron_bench.storage import schemas, tensors
+from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
 CONFIG = "search.json"  # In the folder of a data set: its config (under "search") and the hash of the physics.
@@ -31,7 +32,7 @@ class Dataset:
 
     def __init__(self, folder: Path, test: bool = False) -> None:
         """Opens the training episodes, or with `test` the test episodes. Raises EmptyDataset, BadDataset."""
-        files = sorted((folder / "blocks").glob("[0-9]*.safetensors"))
+        files = visible(folder / "blocks", "[0-9]*.safetensors")
         if not files:
             raise EmptyDataset(f"{folder} holds no data set; make one with `dextron-bench success data`")
         if gaps := [number for number, file in enumerate(files) if int(file.stem) != number]:
@@ -94,7 +95,7 @@ def read_config(folder: Path) -> dict[str, Any]:
     Raises DamagedFile.
     """
     file = folder / CONFIG
-    return atomic.read_json(file) if file.exists() else {}
+    return schemas.read(file, schemas.SEARCH) if file.exists() else {}
 
 
 def _damaged(file: Path, fault: str) -> BadDataset:

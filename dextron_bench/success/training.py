@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from dextron_bench.storage import tensors
+from dextron_bench.storage import schemas, tensors
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.success.dataset import Dataset, read_config
@@ -23,6 +23,7 @@ STATE = "fit.safetensors"  # In the folder of a data set: all that an unfinished
 MODEL = "model.safetensors"  # In the same folder: the trained model.
 SCALE_ROWS = 100_000  # Transitions that give mean and deviation of the states.
 TEST_ROWS = 50_000  # Transitions of held-out episodes for each point of the learning curve.
+SHA256 = "sha256"  # Of the arrays, in the metadata of STATE.
 ADAM_STATE = ("step", "exp_avg", "exp_avg_sq")
 
 
@@ -65,7 +66,8 @@ def train(folder: Path, config: TrainingConfig, progress: Progress = no_progress
     while run.epoch < config.epochs:
         progress(run.epoch, config.epochs, run.note())
         run.advance()
-        tensors.write(file, run.state(), run.about())
+        state = run.state()
+        tensors.write(file, state, run.about() | {SHA256: tensors.digest(state)})
     progress(run.epoch, config.epochs, run.note())
     tensors.write(folder / MODEL, run.best, run.about())
     return SuccessModel(run.best)
@@ -164,21 +166,28 @@ class _TrainingRun:
 
     def resume(self, file: Path) -> None:
         """Restores the training that wrote a file; raises FolderMismatch, BadTensors."""
-        about, arrays = tensors.read_about(file), tensors.read(file)
+        about, arrays = schemas.read_about(file, schemas.FIT), tensors.read(file)
         expected = {"fit": asdict(self._config), "rows": len(self._data)}
         stored = {**about.get("fit", {}), "epochs": self._config.epochs}  # A training with fewer epochs may continue.
         if {"fit": stored, "rows": about.get("rows")} != expected or about["epoch"] > self._config.epochs:
             raise FolderMismatch(
                 f"{self._folder} holds another training; remove {file.name} there, or train with its settings"
             )
+        if len(about["curve"]) != about["epoch"] or about.get(SHA256) not in (None, tensors.digest(arrays)):
+            raise tensors.BadTensors(file, "it does not hold what was written; remove it")
         self.epoch, self.curve = about["epoch"], about["curve"]
-        if lacking := [name for name in self.arrays() if f"best.{name}" not in arrays]:
-            raise tensors.BadTensors(file, f"it is not an unfinished training: it lacks 'best.{lacking[0]}'; remove it")
+        expected_names = {*self.arrays(), *(f"best.{name}" for name in self.arrays()), *self._adam_names()}
+        if lacking := sorted(expected_names - arrays.keys()):
+            raise tensors.BadTensors(file, f"it is not an unfinished training: it lacks {lacking[0]!r}; remove it")
         self.best = {name: arrays[f"best.{name}"] for name in self.arrays()}
         with torch.no_grad():
             for i, parameter in enumerate(self._parameters):
                 parameter.copy_(torch.tensor(arrays[f"layer.{i}"]))
                 self._optimiser.state[parameter] = {n: torch.tensor(arrays[f"adam.{i}.{n}"]) for n in ADAM_STATE}
+
+    def _adam_names(self) -> list[str]:
+        """Names of the optimiser's arrays in a file."""
+        return [f"adam.{i}.{name}" for i in range(len(self._parameters)) for name in ADAM_STATE]
 
     def _rng(self, *stream: int) -> np.random.Generator:
         return np.random.default_rng([self._config.seed, *stream])

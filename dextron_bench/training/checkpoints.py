@@ -1,14 +1,12 @@
 """The folder of a training: everything that an interrupted training needs to continue and end with the same bytes.
 
 After each period the files are written in this order: journal, snapshots of weights, metrics, checkpoint. The
-checkpoint says how many epochs are done. If the other files hold later epochs, their period was interrupted: `resume`
-removes these parts, and the training writes them again.
+checkpoint says how many epochs are done, and lists the SHA-256 of all that belongs to it. If the other files hold later
+epochs, their period was interrupted: `resume` removes these parts, and the training writes them again.
 """
 
 from __future__ import annotations
 
-import json
-import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,9 +16,12 @@ from typing import Any
 
 from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Trainer
-from dextron_bench.storage import atomic, tensors
+from dextron_bench.storage import atomic, hashing, schemas, tensors
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
+from dextron_bench.storage.folders import visible
+from dextron_bench.training import checkpoint_list, metric_rows
+from dextron_bench.training.metric_rows import METRICS
 
 try:
     import fcntl
@@ -28,7 +29,6 @@ except ImportError:  # On Windows, nothing stops two processes from training in 
     fcntl = None
 
 CHECKPOINT = "checkpoint.safetensors"
-METRICS = "metrics.jsonl"
 JOURNALS = "journals"
 
 
@@ -55,6 +55,7 @@ class Checkpoints:
 
     def __init__(self, folder: Path, seeds: Sequence[int]) -> None:
         self.folder, self.seeds = folder, tuple(seeds)
+        self._listed: dict[str, str] = {}  # SHA-256 of journals and snapshots of this training, by path in the folder.
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -68,19 +69,27 @@ class Checkpoints:
                 raise Busy(
                     f"another process is training in {self.folder}; wait for it, or choose another --runs"
                 ) from None
-            for file in self.folder.rglob(".*.part"):  # From a process that was killed while it wrote.
+            for file in self.folder.rglob(f".*{atomic.PART}"):  # From a process that was killed while it wrote.
                 file.unlink()
             yield
 
     def progress(self) -> TrainingProgress | None:
         """The progress in the last checkpoint, None if there is no checkpoint; raises DamagedFile."""
+        about = self._about()
+        return TrainingProgress(about["epoch"], about["epochs"], about["device"]) if about else None
+
+    def _about(self) -> dict[str, Any]:
+        """The metadata of the last checkpoint, empty if there is no checkpoint; raises DamagedFile."""
         file = self.folder / CHECKPOINT
         if not file.exists():
-            return None
+            return {}
         try:
-            return TrainingProgress(**tensors.read_about(file))
-        except (tensors.BadTensors, TypeError) as error:
+            about = schemas.read_about(file, schemas.CHECKPOINT)
+        except tensors.BadTensors as error:
             raise self._damaged(CHECKPOINT) from error
+        if not checkpoint_list.is_intact(about):
+            raise self._damaged(f"{CHECKPOINT}: its metadata differs from the digest that it carries")
+        return about
 
     def save(
         self, trainer: Trainer, progress: TrainingProgress, rows: list[dict[str, Any]], about: dict[str, Any]
@@ -92,23 +101,31 @@ class Checkpoints:
         for seed, arrays in zip(self.seeds, trainer.weights(), strict=True):
             metadata = {**about, "seed": seed, "seeds": self.seeds, "epoch": epoch, "frames": frames.get(seed)}
             tensors.write(self.snapshot(epoch, seed), arrays, metadata)
-        with (self.folder / METRICS).open("a", encoding="utf-8") as file:
-            file.write("".join(json.dumps(row, sort_keys=True) + "\n" for row in rows))
-            file.flush()
-            os.fsync(file.fileno())
-        tensors.write(self.folder / CHECKPOINT, trainer.state(), asdict(progress))
+        metric_rows.append(self.folder, rows)
+        state = trainer.state()
+        written = [self._journal(epoch), *(self.snapshot(epoch, seed) for seed in self.seeds)]
+        self._listed |= checkpoint_list.hashes(self.folder, written)
+        whole = {
+            METRICS: hashing.digest(metric_rows.first(self.folder, self._rows(epoch))),
+            CHECKPOINT: tensors.digest(state),
+        }
+        about = {**asdict(progress), "files": self._listed | whole}
+        tensors.write(self.folder / CHECKPOINT, state, checkpoint_list.sealed(about))
 
     def resume(self, trainer: Trainer, device: str) -> None:
         """Restores a trainer from the last checkpoint, and removes everything that was written after it.
 
-        Raises DamagedFile, and FolderMismatch if the training began on another device: its numbers differ in the last
-        bits.
+        Raises DamagedFile if something is missing or changed, and FolderMismatch if the training began on another
+        device: its numbers differ in the last bits.
         """
         progress = self.progress()
+        if not progress and len(self._snapshots()) > 1:  # One is of a first period that was interrupted.
+            raise self._damaged(f"{CHECKPOINT} is missing")
         if progress and progress.device != device:
             raise FolderMismatch(
                 f"{self.folder} was begun on {progress.device}: continue with --device {progress.device}, or remove it"
             )
+        self._listed = self._checked(progress.epoch) if progress else {}
         self._discard_after(progress.epoch if progress else 0)
         if progress:
             self._restore(trainer)
@@ -116,7 +133,9 @@ class Checkpoints:
                 raise self._damaged(f"it restores epoch {trainer.epoch}, not {progress.epoch}")
 
     def finish(self) -> None:
-        """Removes the journals, which only an unfinished training needs."""
+        """Removes the journals, which only an unfinished training needs; raises DamagedFile if something is changed."""
+        if progress := self.progress():
+            self._checked(progress.epoch, finished=True)
         shutil.rmtree(self.folder / JOURNALS, ignore_errors=True)
 
     def snapshot(self, epoch: int, seed: int) -> Path:
@@ -130,16 +149,32 @@ class Checkpoints:
 
     def metrics(self) -> list[dict[str, Any]]:
         """One row for each epoch and seed, in order; raises DamagedFile."""
-        try:
-            lines = (self.folder / METRICS).read_text(encoding="utf-8").splitlines()
-            return [json.loads(line) for line in lines]
-        except (OSError, ValueError) as error:
-            raise self._damaged(f"{METRICS}: {error}") from error
+        return metric_rows.read(self.folder)
+
+    def _checked(self, epoch: int, finished: bool = False) -> dict[str, str]:
+        """The list of the last checkpoint, after a check of all that it names; raises DamagedFile.
+
+        A training that is `finished` needs no journals and no state. The list of an earlier version is made now.
+        """
+        about = self._about()
+        present = [self.snapshot(number, seed) for number in self.epochs() for seed in self.seeds]
+        if not finished:
+            present += [self._journal(number) for number in self._journaled() if number <= epoch]
+        if "files" not in about:
+            return checkpoint_list.hashes(self.folder, [file for file in present if file.exists()])
+        listed = {name: about["files"][name] for name in about["files"] if name not in (METRICS, CHECKPOINT)}
+        needed = {name: listed[name] for name in listed if not (finished and name.startswith(JOURNALS))}
+        checkpoint_list.check(self.folder, needed, present)
+        if hashing.digest(metric_rows.first(self.folder, self._rows(epoch))) != about["files"].get(METRICS):
+            raise self._damaged(f"{METRICS} differs from what its checkpoint lists")
+        return listed
 
     def _restore(self, trainer: Trainer) -> None:
         """Restores a trainer from checkpoint and journals; raises DamagedFile, AgentError."""
         try:
             state = tensors.read(self.folder / CHECKPOINT)
+            if self._about().get("files", {}).get(CHECKPOINT) not in (None, tensors.digest(state)):
+                raise self._damaged(f"{CHECKPOINT} has other values than it lists")
             with as_agent_error("restore() of the trainer"):
                 trainer.restore(state, (tensors.read(self._journal(epoch)) for epoch in self._journaled()))
         except (tensors.BadTensors, AgentError) as error:
@@ -155,22 +190,21 @@ class Checkpoints:
         for number, snapshots in self._snapshots().items():
             if number > epoch:
                 shutil.rmtree(snapshots)
-        file = self.folder / METRICS
-        lines = file.read_bytes().splitlines(keepends=True) if file.exists() else []
-        kept = lines[: epoch * len(self.seeds)]
-        if len(kept) < epoch * len(self.seeds):
-            raise self._damaged(f"{METRICS} ends before epoch {epoch}")
-        if lines != kept:
-            atomic.write_atomically(file, lambda part: part.write_bytes(b"".join(kept)))
+        metric_rows.cut(self.folder, self._rows(epoch))
+
+    def _rows(self, epoch: int) -> int:
+        """The number of rows of metrics up to an epoch."""
+        return epoch * len(self.seeds)
 
     def _snapshots(self) -> dict[int, Path]:
         """The folders of snapshots, by epoch."""
-        folders = (self.folder / "weights").glob("epoch-*")
-        return {int(folder.name.removeprefix("epoch-")): folder for folder in folders}
+        folders = {folder.name.removeprefix("epoch-"): folder for folder in visible(self.folder / "weights", "epoch-*")}
+        return {int(number): folder for number, folder in folders.items() if number.isdecimal()}
 
     def _journaled(self) -> list[int]:
         """The epochs with a journal, in order."""
-        return sorted(int(file.stem) for file in (self.folder / JOURNALS).glob("[0-9]*.safetensors"))
+        files = visible(self.folder / JOURNALS, "[0-9]*.safetensors")
+        return sorted(int(file.stem) for file in files if file.stem.isdecimal())
 
     def _journal(self, epoch: int) -> Path:
         return self.folder / JOURNALS / f"{epoch:06d}.safetensors"

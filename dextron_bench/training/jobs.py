@@ -10,7 +10,7 @@ from dextron_bench.methods import registry
 from dextron_bench.methods.learners import Learner, Track
 from dextron_bench.reaches import sources
 from dextron_bench.splits.loading import load_split
-from dextron_bench.storage import atomic, folder_config, tensors
+from dextron_bench.storage import atomic, folder_config, schemas, tensors
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder, source_folder
 from dextron_bench.training import loop, timing
@@ -89,8 +89,9 @@ class TrainingJob:
         """Writes learning curve and best weights of a seed into the folder of its run, the weights last."""
         best, last = curve.best(seed), checkpoints.epochs()[-1]
         snapshot, run = checkpoints.snapshot(best, seed), self.run_folder(seed)
-        frames = tensors.read_about(checkpoints.snapshot(last, seed)).get("frames")
-        about = tensors.read_about(snapshot) | {"best_epoch": best, "epochs": last, "frames": frames and int(frames)}
+        frames = schemas.read_about(checkpoints.snapshot(last, seed), schemas.SNAPSHOT).get("frames")
+        about = schemas.read_about(snapshot, schemas.SNAPSHOT)
+        about |= {"best_epoch": best, "epochs": last, "frames": frames and int(frames)}
         del about["epoch"]
         atomic.write_json(run.curve, {"split": "val", "points": curve.points(seed)})
         tensors.write(run.weights, tensors.read(snapshot), about | {"reaches": self.reaches})

@@ -13,8 +13,8 @@ from dextron_bench.methods.agents import as_agent_error
 from dextron_bench.methods.learners import Learner
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic, tensors
-from dextron_bench.storage.atomic import DamagedFile, read_json
+from dextron_bench.storage import atomic, hashing, schemas, tensors
+from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.world import task
 
@@ -65,17 +65,22 @@ class Curve:
         snapshot = self._checkpoints.snapshot(epoch, seed)
         file = snapshot.with_name(f"{snapshot.stem}-val{rows}.json")
         if file not in self._cache:
-            self._cache[file] = self._stored(file) or self._play_and_store(snapshot, file, rows)
+            self._cache[file] = self._stored(file, rows) or self._play_and_store(snapshot, file, rows)
         return self._cache[file]
 
-    def _stored(self, file: Path) -> list[float]:
-        """The scores in a file; empty if there are none on this version of `val`."""
-        content = read_json(file) if file.exists() else {}
-        return content["scores"] if content.get("digest") == self._val.digest else []
+    def _stored(self, file: Path, rows: int) -> list[float]:
+        """The scores in a file; empty if there are none on this version of `val`. Raises DamagedFile."""
+        content = schemas.read(file, schemas.VAL_SCORES) if file.exists() else {}
+        if content.get("digest") != self._val.digest:
+            return []
+        scores = content["scores"]
+        if len(scores) != rows or content.get("sha256") not in (None, _sha256(scores)):
+            raise DamagedFile(file, f"it does not hold the {rows} scores that were written")
+        return scores
 
     def _play_and_store(self, snapshot: Path, file: Path, rows: int) -> list[float]:
         scores = self._play(snapshot, rows)
-        atomic.write_json(file, {"digest": self._val.digest, "scores": scores})
+        atomic.write_json(file, {"digest": self._val.digest, "scores": scores, "sha256": _sha256(scores)})
         return scores
 
     def _play(self, snapshot: Path, rows: int) -> list[float]:
@@ -88,6 +93,10 @@ class Curve:
         cases = self._val.cases[:rows]
         scores = {row: episode.score for row, episode in rollout(agent, self._source, cases, threads=self._threads)}
         return [scores[row] for row in range(rows)]
+
+
+def _sha256(scores: list[float]) -> str:
+    return hashing.digest(*(float(score).hex().encode() for score in scores))
 
 
 def mean(scores: list[float]) -> float:

@@ -18,6 +18,7 @@ from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, Track, Trainer
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import folder_config, hashing
+from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.training import timing
 from dextron_bench.training.checkpoints import Checkpoints, TrainingProgress
@@ -38,7 +39,7 @@ def folder_of(base: Path, seeds: Sequence[int]) -> Path:
 
 def training_folders(base: Path, below: str = "") -> dict[Path, tuple[int, ...]]:
     """The folders that `folder_of` names, with their seeds; `below` is a pattern of folders between, as "*/*/"."""
-    matches = {folder: NAME.fullmatch(folder.name) for folder in sorted(base.glob(f"{below}training-*"))}
+    matches = {folder: NAME.fullmatch(folder.name) for folder in visible(base, f"{below}training-*")}
     return {folder: tuple(map(int, match[1].split("+"))) for folder, match in matches.items() if match}
 
 

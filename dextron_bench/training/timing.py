@@ -8,6 +8,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from dextron_bench.storage import atomic, schemas
+
 FILE = "timing.jsonl"  # In the folder of a training.
 RECENT = 50  # Newest rows that an estimate uses.
 
@@ -15,7 +17,7 @@ RECENT = 50  # Newest rows that an estimate uses.
 def append(folder: Path, activity: str, epoch: int, seconds: float, device: str) -> None:
     """Adds a row: `activity` is "epoch" or "evaluation"."""
     row = {"what": activity, "epoch": epoch, "seconds": round(seconds, 4), "device": device}
-    with (folder / FILE).open("a", encoding="utf-8") as file:
+    with atomic.naming(folder / FILE), (folder / FILE).open("a", encoding="utf-8") as file:
         file.write(json.dumps(row) + "\n")
 
 
@@ -36,11 +38,7 @@ def seconds(folder: Path) -> float | None:
 
 
 def _rows(folder: Path) -> list[dict[str, Any]]:
-    """All whole rows; a line that was cut off is left out."""
-    file, rows = folder / FILE, []
-    for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
-        try:
-            rows.append(json.loads(line))
-        except ValueError:
-            continue
-    return rows
+    """All whole rows; a line that was cut off or damaged is left out, since nothing but estimates depends on it."""
+    file = folder / FILE
+    content = file.read_bytes() if file.exists() else b""
+    return [row for row in schemas.rows(content, schemas.DURATION) if row]

@@ -4,22 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
+import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
 from dextron_bench.reaches.reach import PALM_AHEAD, Path
 from dextron_bench.world import model, task
 
+STATE_BOUND = 1e10  # Above this, MuJoCo declares a simulation unstable.
+DIVERGED = "the simulation diverged"  # The failure of such an episode.
+UNSTABLE = slice(mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQACC + 1)
+
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The result of one control step: states (n, 48), and the other arrays of shape (n,)."""
+    """The result of one control step: states (n, 48), and the other arrays of shape (n,).
+
+    `diverged` is true for a simulation with a number that is not finite or exceeds STATE_BOUND. Its episode is
+    terminated without a reward, and its state is the model at rest.
+    """
 
     states: np.ndarray
     rewards: np.ndarray
     terminated: np.ndarray
     truncated: np.ndarray
+    diverged: np.ndarray
 
     @property
     def ended(self) -> np.ndarray:
@@ -35,7 +46,7 @@ class Engine:
 
     def __init__(self, slots: int, threads: int = 0) -> None:
         """Allocates `slots` slots that step on `threads` threads (0: one per processor)."""
-        self._batch = Batch(model.load(), slots, threads)
+        self._threads, self._batch = threads, Batch(model.load(), slots, threads)
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         self._ctrl = self._batch.bind("ctrl")
         self._mocap_pos = self._batch.bind("mocap_pos")
@@ -54,6 +65,7 @@ class Engine:
 
     def begin(self, ids: np.ndarray, paths: Sequence[Path]) -> np.ndarray:
         """Begins an episode along a path in each slot of `ids` (n,), and returns the first states (n, 48)."""
+        self._batch.warning[ids] = 0
         lengths = np.array([len(path) for path in paths])
         for slot, path in zip(ids, paths, strict=True):
             n = min(len(path), self._positions.shape[1])
@@ -80,11 +92,25 @@ class Engine:
         self._mocap_pos[ids, 0], self._mocap_quat[ids, 0] = self._positions[ids, pose], self._quaternions[ids, pose]
         self._batch.step(np.sort(ids), nstep=model.substeps())
         states = self.states(ids)
-        return Step(states, *self._progress.advance(ids, states))
+        diverged = self._diverged(ids, states)
+        if diverged.any():
+            self._batch.state[ids[diverged]] = self._initial_state
+            states = self.states(ids)
+        reward, terminated, truncated = self._progress.advance(ids, states)
+        reward[diverged], terminated[diverged], truncated[diverged] = 0.0, True, False
+        return Step(states, reward, terminated, truncated, diverged)
+
+    def _diverged(self, ids: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """True for slots `ids` (n,), in states (n, 48), that MuJoCo has reset or would reset next, shape (n,).
+
+        MuJoCo tests a state when a physics step begins; so the state after the last one is tested here.
+        """
+        is_stable = np.abs(states).max(axis=1) <= STATE_BOUND  # False for NaN.
+        return ~is_stable | self._batch.warning[ids, UNSTABLE, 1].any(axis=1)
 
     def fork(self, source: np.ndarray, target: np.ndarray) -> None:
         """Copies the episodes of slots `source` (n,), in their present state, into slots `target` (n,)."""
-        for rows in (self._batch.state, self._positions, self._quaternions):
+        for rows in (self._batch.state, self._batch.warning, self._positions, self._quaternions):
             rows[target] = rows[source]
         self._progress.copy(source, target)
 
@@ -94,8 +120,20 @@ class Engine:
 
     def load(self, ids: np.ndarray, saved: dict[str, np.ndarray]) -> None:
         """Restores episodes from `save` in slots `ids` (n,), which must have begun on the same paths."""
+        self._batch.warning[ids] = 0
         for name, rows in self._episode_arrays().items():
             rows[ids] = saved[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy, or another process, needs to continue all episodes."""
+        episodes = self.save(np.arange(self.slots))
+        return {"threads": self._threads, "episodes": episodes, "paths": (self._positions, self._quaternions)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        ids = np.arange(len(state["episodes"]["state"]))
+        self.__init__(len(ids), state["threads"])
+        self._positions[:], self._quaternions[:] = state["paths"]
+        self.load(ids, state["episodes"])
 
     def _episode_arrays(self) -> dict[str, np.ndarray]:
         """The arrays with one row for each slot, by the names that they have in checkpoints."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dextron_bench.reaches.setting import Setting, Source
+from dextron_bench.reaches.setting import Setting, Source, checked_setting
 from dextron_bench.reaches.sources import open_source
 
 
@@ -36,11 +36,14 @@ class SettingQueue:
     """Returns one setting for each episode: the settings of a list in turn, or random ones from the source."""
 
     def __init__(self, reaches: str | Source, settings: Sequence[Setting] | None = None) -> None:
-        """Takes a source or its name. Raises UnknownSource, and ValueError if the list is empty."""
+        """Takes a source or its name.
+
+        Raises UnknownSource, ValueError if the list is empty, and SettingError if it holds something else.
+        """
         if settings is not None and not settings:
             raise ValueError("settings is an empty list; pass at least one setting, or None to draw from the source")
         self.source = open_source(reaches) if isinstance(reaches, str) else reaches
-        self._settings = settings
+        self._settings = settings if settings is None else [checked_setting(setting) for setting in settings]
         self._position = 0
 
     def rewind(self) -> None:

@@ -1,7 +1,8 @@
 """The task as Gymnasium environments, registered as dextron_bench/Grasp-v0.
 
 The info of every reset and step has the `setting` of the episode, its `episode_return` so far, and `is_success`. The
-last is true from the step on which the return reaches SUCCESS.
+last is true from the step on which the return reaches SUCCESS. If the simulation diverged, the episode is terminated,
+and the info has `failure`. An environment can be copied and pickled during an episode; the copy continues the episode.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from gymnasium.vector.utils import batch_space
 
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import model, task
-from dextron_bench.world.engine import Engine
+from dextron_bench.world.engine import DIVERGED, STATE_BOUND, Engine
 from dextron_bench.world.environment import SettingQueue, validated_action
+from dextron_bench.world.reset_options import chosen_setting, reset_mask, seed_number, slot_seeds, slot_settings
 
 FRAME = (480, 360)  # [px] width and height of rendered frames.
-STATE_BOUND = 1e10  # Above this, MuJoCo declares a simulation unstable.
 RENDERING: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": round(1.0 / model.CONTROL_STEP)}
 
 
@@ -42,6 +43,14 @@ def render_frames(states: np.ndarray) -> np.ndarray:
     from dextron_bench.world.rendering import renderer  # Loads OpenGL, which most runs do not need.
 
     return renderer.frames(states, *FRAME)
+
+
+def objects(values: Sequence[Any] | np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The values (n,) as objects where `mask` (n,) is true, None elsewhere."""
+    kept = np.full(len(mask), None, object)
+    for slot in np.flatnonzero(mask).tolist():
+        kept[slot] = values[slot]
+    return kept
 
 
 class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -68,11 +77,14 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begins the next episode, or the one of `options["setting"]`. A seed also returns to the first setting."""
-        super().reset(seed=seed)
+        """Begins the next episode, or the one of `options["setting"]`. A seed also returns to the first setting.
+
+        Raises SettingError; UnknownReach or ReachError if the source has no path for the setting.
+        """
+        chosen = chosen_setting(options)
+        super().reset(seed=seed_number(seed))
         if seed is not None:
             self._settings.rewind()
-        chosen = (options or {}).get("setting")
         self._setting = chosen or self._settings.next(self.np_random)
         states = self._engine.begin(self._slot, [self._settings.source.path(self._setting)])
         self._live, self._return = True, 0.0
@@ -85,7 +97,8 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         step = self._engine.step(self._slot, validated_action(action, (1,))[None])
         self._live, reward = not step.ended[0], float(step.rewards[0])
         self._return += reward
-        return step.states[0], reward, bool(step.terminated[0]), bool(step.truncated[0]), self._info()
+        info = self._info() | ({"failure": DIVERGED} if step.diverged[0] else {})
+        return step.states[0], reward, bool(step.terminated[0]), bool(step.truncated[0]), info
 
     def render(self) -> np.ndarray | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """A picture (H, W, 3) of the present state; None without a render mode."""
@@ -99,8 +112,8 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     """Plays many episodes in parallel on one engine: the same as many `GraspEnv`s, but much faster.
 
-    The step after the last step of an episode begins the next episode of that slot. It ignores the action, and its
-    reward is 0.
+    `autoreset_mode` has Gymnasium's meaning. By default, the step after the last step of an episode begins the next
+    episode of that slot; it ignores the action, and its reward is 0.
     """
 
     metadata = RENDERING | {"autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -112,12 +125,15 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         settings: Sequence[Setting] | None = None,
         threads: int = 0,
         render_mode: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
         """Like `GraspEnv`. Each slot that becomes free takes the next one of `settings`.
 
-        `threads` as in `Engine`. Raises UnknownSource, and MissingData for `real` before its import.
+        `threads` as in `Engine`. Raises UnknownSource, MissingData for `real` before its import, and ValueError for an
+        unknown mode.
         """
         self.num_envs, self.render_mode = num_envs, render_mode
+        self.metadata = RENDERING | {"autoreset_mode": AutoresetMode(autoreset_mode)}
         self.single_observation_space, self.single_action_space = observation_space(), action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -130,45 +146,81 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begins an episode in every slot. Slot k is seeded by `seed + k`, or by the k-th of a list."""
-        if seed is not None:
-            seeds = [seed + k for k in range(self.num_envs)] if isinstance(seed, int) else seed
-            pairs = zip(seeds, self._rngs, strict=True)
-            self._rngs = [rng if slot_seed is None else np_random(slot_seed)[0] for slot_seed, rng in pairs]
+        """Begins an episode in every slot, or where `options["reset_mask"]`, a bool array (n,), is true.
+
+        Slot k is seeded by `seed + k`, or by the k-th of a list. If every slot is reset, a seed also returns to the
+        first setting. `options["setting"]` is a setting for all these slots, or a list with one (or None) for each slot
+        of the environment. Raises as `GraspEnv.reset` does; TypeError and ValueError for options of another form.
+        """
+        mask, settings = reset_mask(options, self.num_envs), slot_settings(options, self.num_envs)
+        seeds = slot_seeds(seed, self.num_envs)
+        if self._ended is None and not mask.all():
+            raise ResetNeeded("no episodes are running; call reset() without a reset_mask first")
+        rngs = {k: np_random(seeds[k])[0] for k in np.flatnonzero(mask).tolist() if seeds[k] is not None}
+        if rngs and mask.all():
             self._settings.rewind()
-        self._ended = np.zeros(self.num_envs, bool)
-        self._begin(np.arange(self.num_envs))
-        return self._states.copy(), self._info()
+        self._rngs = [rngs.get(k, rng) for k, rng in enumerate(self._rngs)]
+        self._begin(np.flatnonzero(mask), settings)
+        self._ended = np.zeros(self.num_envs, bool) if self._ended is None else self._ended & ~mask
+        return self._states.copy(), self._info(mask)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Advances every slot by one control step. Raises ActionError, and ResetNeeded before the first reset."""
+        """Advances every slot by one control step. Raises ActionError, and ResetNeeded before the first reset.
+
+        In the mode DISABLED it also raises ResetNeeded if a slot's episode is over.
+        """
         if self._ended is None:
             raise ResetNeeded("no episodes are running; call reset() first")
+        mode = self.metadata["autoreset_mode"]
+        if mode is AutoresetMode.DISABLED and self._ended.any():
+            slots = np.flatnonzero(self._ended).tolist()
+            raise ResetNeeded(f"the episodes of slots {slots} are over; reset them with options['reset_mask']")
         actions = validated_action(actions, (self.num_envs, 1))
         live, ended = np.flatnonzero(~self._ended), np.flatnonzero(self._ended)
         rewards = np.zeros(self.num_envs)
-        terminated, truncated = np.zeros((2, self.num_envs), bool)
+        terminated, truncated, diverged = np.zeros((3, self.num_envs), bool)
         if len(live):
             step = self._engine.step(live, actions[live])
             self._states[live], rewards[live] = step.states, step.rewards
-            terminated[live], truncated[live] = step.terminated, step.truncated
+            terminated[live], truncated[live], diverged[live] = step.terminated, step.truncated, step.diverged
         self._returns += rewards
         if len(ended):
             self._begin(ended)
         self._ended = terminated | truncated
-        return self._states.copy(), rewards, terminated, truncated, self._info()
+        if mode is AutoresetMode.SAME_STEP and self._ended.any():
+            info = self._restart(diverged)
+        else:
+            info = self._info(np.ones(self.num_envs, bool), diverged)
+        return self._states.copy(), rewards, terminated, truncated, info
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Pictures (H, W, 3), one of each slot; None without a render mode."""
         return tuple(render_frames(self._states)) if self.render_mode == "rgb_array" else None
 
-    def _begin(self, slots: np.ndarray) -> None:
-        for slot in slots:
-            self._playing[slot] = self._settings.next(self._rngs[slot])
-        self._states[slots] = self._engine.begin(slots, [self._settings.source.path(s) for s in self._playing[slots]])
+    def _begin(self, slots: np.ndarray, settings: Sequence[Setting | None] | None = None) -> None:
+        """Begins an episode in each of `slots` (n,), in the setting of that slot in `settings`, or in the next one."""
+        chosen = [settings[slot] if settings else None for slot in slots]
+        playing = [s or self._settings.next(self._rngs[slot]) for s, slot in zip(chosen, slots, strict=True)]
+        self._states[slots] = self._engine.begin(slots, [self._settings.source.path(setting) for setting in playing])
+        self._playing[slots] = playing
         self._returns[slots] = 0.0
 
-    def _info(self) -> dict[str, Any]:
-        success = self._returns >= task.SUCCESS
-        info = {"setting": self._playing.copy(), "episode_return": self._returns.copy(), "is_success": success}
-        return info | {f"_{key}": np.ones(self.num_envs, bool) for key in info}
+    def _restart(self, diverged: np.ndarray) -> dict[str, Any]:
+        """Begins the next episode where one is over; the info has the last state and info of the old episode."""
+        assert self._ended is not None
+        over = self._ended
+        final = {"final_obs": objects(self._states.copy(), over), "final_info": self._info(over, diverged)}
+        self._begin(np.flatnonzero(over))
+        self._ended = np.zeros(self.num_envs, bool)
+        masks = {f"_{key}": over.copy() for key in final}
+        return final | masks | self._info(np.ones(self.num_envs, bool))
+
+    def _info(self, mask: np.ndarray, diverged: np.ndarray | None = None) -> dict[str, Any]:
+        """The info of the slots of `mask` (n,); other entries are empty, as in Gymnasium."""
+        returns = np.where(mask, self._returns, 0.0)
+        info = {"setting": objects(self._playing, mask), "episode_return": returns}
+        info["is_success"] = returns >= task.SUCCESS
+        info |= {f"_{key}": mask.copy() for key in info}
+        if diverged is not None and diverged.any():
+            info |= {"failure": objects([DIVERGED] * self.num_envs, diverged), "_failure": diverged.copy()}
+        return info

@@ -15,6 +15,7 @@ from dm_env import specs
 from dextron_bench.reaches.reach import PALM_AHEAD, Path
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import model, task
+from dextron_bench.world.engine import DIVERGED, STATE_BOUND, UNSTABLE
 from dextron_bench.world.environment import SettingQueue, validated_action
 
 
@@ -34,6 +35,8 @@ def load(
 class Physics(dm_mujoco.Physics):
     """The simulated hand, bottle and table; its steps are bit-equal to the engine's."""
 
+    diverged = False  # True after a step in which a number was not finite or exceeded STATE_BOUND.
+
     @classmethod
     def load(cls) -> Physics:
         """A simulation with a copy of the model."""
@@ -43,6 +46,21 @@ class Physics(dm_mujoco.Physics):
         """Computes derived quantities, and clears the solver's last result, which would influence the next step."""
         super().after_reset()
         self.data.qacc_warmstart[:] = 0.0
+
+    def step(self, nstep: int = 1) -> None:
+        """Advances the simulation by `nstep` physics steps. It is at rest after a step that diverges, as in the engine.
+
+        Raises PhysicsError for any other warning of MuJoCo.
+        """
+        try:
+            super().step(nstep)
+            self.diverged = not np.abs(self.states()).max() <= STATE_BOUND  # True for NaN.
+        except control.PhysicsError:
+            if not self.data.warning.number[UNSTABLE].any():
+                raise
+            self.diverged = True
+        if self.diverged:
+            self.reset()
 
     def states(self) -> np.ndarray:
         """A copy of the state, shape (1, 48)."""
@@ -56,9 +74,14 @@ class Physics(dm_mujoco.Physics):
 
 
 class Grasp(control.Task):
-    """Close the hand in time to lift the bottle. `setting` is the setting of the present episode."""
+    """Close the hand in time to lift the bottle.
+
+    `setting` is the setting of the present episode. `failure` is empty, or says that its simulation diverged, which
+    ends it without a reward.
+    """
 
     setting: Setting
+    failure = ""
 
     def __init__(self, settings: SettingQueue, rng: np.random.Generator) -> None:
         self._settings, self._rng = settings, rng
@@ -67,6 +90,7 @@ class Grasp(control.Task):
 
     def initialize_episode(self, physics: Physics) -> None:
         """Takes the next setting, half closes the hand, and puts it at the start of the reach."""
+        self.failure = ""
         self.setting = self._settings.next(self._rng)
         self._path = self._settings.source.path(self.setting)
         physics.move_carrier(self._path, 0)
@@ -85,6 +109,8 @@ class Grasp(control.Task):
         """Computes the reward and the end of the episode."""
         reward, terminated, truncated = self._progress.advance(np.array([0]), physics.states())
         self._outcome = (float(reward[0]), bool(terminated[0]), bool(truncated[0]))
+        if physics.diverged:
+            self.failure, self._outcome = DIVERGED, (0.0, True, False)
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """The state (48,): joint positions (25), then velocities (23)."""
@@ -95,7 +121,7 @@ class Grasp(control.Task):
         return self._outcome[0]
 
     def get_termination(self, physics: Physics) -> float | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Discount of the last step: 0 if the bottle fell, 1 if the episode was truncated; None during the episode."""
+        """Discount of the last step: 0 if it was terminated, 1 if it was truncated; None during the episode."""
         _, terminated, truncated = self._outcome
         return 0.0 if terminated else 1.0 if truncated else None
 

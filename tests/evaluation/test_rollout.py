@@ -9,6 +9,8 @@ from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.reaches.setting import Setting
+from tests.helpers.short_reaches import SETTINGS, TORN, TORN_POSE, TornSource
+from tests.helpers.short_reaches import SOURCE as SHORT
 
 SOURCE = MinjerkSource()
 CASES = [Case(Setting(SOURCE.names[i], 0.0, 0.0, 0.0), Expert(2.0, d_c), 0.0) for i, d_c in enumerate([0.15, 0.9, 0.1])]
@@ -69,6 +71,24 @@ def test_an_invalid_action_fails_the_episode_and_is_named(value, reason):
     episodes = play(Sends(value))
     assert all(episode.failure.startswith(reason) for episode in episodes.values())
     assert [episode.score for episode in episodes.values()] == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("slots", [1, 2, 3])
+def test_a_simulation_that_diverges_fails_its_episode_and_is_named(slots):
+    """MuJoCo resets such a simulation by itself; the episode continued with the bottle and hand at their origins."""
+    cases = [Case(setting, Expert(2.0, 0.15), 0.0) for setting in (SETTINGS[0], TORN, SETTINGS[4])]
+    episodes = dict(rollout(ExpertAgent(), TornSource(), cases, slots, threads=1))
+    assert sorted(episodes) == [0, 1, 2]
+    torn = episodes[1]
+    assert torn.failure == f"the simulation diverged at step {TORN_POSE - 1}"
+    assert (torn.score, torn.success, torn.terminated, torn.truncated) == (0.0, False, False, False)
+    assert torn.states.shape == (TORN_POSE, 48)
+    assert torn.actions.shape == (TORN_POSE - 1, 1)
+    assert np.isfinite(torn.states).all()
+    for index, case in ((0, cases[0]), (2, cases[2])):
+        alone = dict(rollout(ExpertAgent(), SHORT, [case], threads=1))[0]
+        assert episodes[index].states.tobytes() == alone.states.tobytes()
+        assert (episodes[index].failure, episodes[index].score) == ("", alone.score)
 
 
 def test_a_fault_does_not_change_other_episodes():

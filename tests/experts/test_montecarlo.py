@@ -16,7 +16,7 @@ from dextron_bench.experts import blocks, montecarlo, policies
 from dextron_bench.experts.blocks import Tally
 from dextron_bench.experts.montecarlo import Search, Share
 from dextron_bench.reaches import setting
-from dextron_bench.storage import folder_config
+from dextron_bench.storage import folder_config, tables
 from dextron_bench.world.engine import Engine
 from tests.helpers.short_reaches import SOURCE
 
@@ -99,6 +99,37 @@ def test_a_damaged_block_is_named(tmp_path):
     block.write_bytes(block.read_bytes()[:100])
     with pytest.raises(blocks.DamagedBlock, match=f"{block.name} is damaged"):
         search(tmp_path, rows=1)
+
+
+def edited(draws: pd.DataFrame) -> pd.DataFrame:
+    """The draws with one return changed; their attributes hold the digest of the old values."""
+    draws.loc[0, "score"] = 10.0 - draws.loc[0, "score"] / 2.0
+    return draws
+
+
+DAMAGES = [
+    (lambda draws: draws.drop(columns="score"), "it lacks the column 'score'"),
+    (edited, "its values differ from the digest that it carries"),
+    (lambda draws: draws.head(5), "it has 5 rows, and a block of this search has 12"),
+    (lambda draws: draws.assign(gain=1.25), "its column 'gain' differs from the draws of this search"),
+    (lambda draws: draws.assign(score=np.inf), "its column 'score' has values that do not belong there"),
+]
+
+
+def test_a_block_that_is_cut_edited_or_of_another_search_is_named(tmp_path):
+    search(tmp_path, rows=1)
+    block = sorted((tmp_path / "blocks").iterdir())[0]
+    whole = block.read_bytes()
+    for change, reason in DAMAGES:
+        draws = change(pd.read_parquet(block))
+        if change is edited:
+            draws.to_parquet(block)
+        else:
+            tables.write(block, draws)
+        with pytest.raises(blocks.DamagedBlock) as caught:
+            search(tmp_path, rows=1)
+        assert str(caught.value) == f"{block} is damaged ({reason}); remove it and search again"
+        block.write_bytes(whole)
 
 
 @pytest.mark.parametrize("text", ["2/2", "-1/2", "half", "1"])

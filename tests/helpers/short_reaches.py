@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from dextron_bench.reaches.minjerk import ORIENTATION
-from dextron_bench.reaches.reach import Reach
+from dextron_bench.reaches.reach import Path, Reach
 from dextron_bench.reaches.setting import ReachSource, Setting
 from dextron_bench.world.engine import Engine
 
@@ -39,7 +39,22 @@ SETTINGS = (
     Setting("a", -0.02, 0.0, 0.7),
     Setting("a", 0.03, 0.04, 0.2),
 )
+TORN, TORN_POSE = Setting("a", *GRASP, 0.3), 30  # A setting whose path has no number at that pose.
 CLOSING = (56, 76, 50, 88, 20)  # Control step from which the fingers close, for each setting.
+
+
+class TornSource(ReachSource):
+    """SOURCE, but the simulation of TORN diverges in the step to TORN_POSE."""
+
+    def __init__(self) -> None:
+        super().__init__("torn", [SOURCE.reach(name) for name in SOURCE.names])
+
+    def path(self, setting: Setting) -> Path:
+        """The path of SOURCE, which is broken for TORN."""
+        path = super().path(setting)
+        if setting == TORN:
+            path.positions[TORN_POSE, 0] = np.nan
+        return path
 
 
 def actions(k: int) -> np.ndarray:

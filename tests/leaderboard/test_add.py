@@ -1,18 +1,52 @@
-"""Names of submissions: a name that equals or resembles another row's name is refused."""
+"""Additions to the board: names that resemble another row's are refused, and the board changes in one step."""
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from dextron_bench.leaderboard import add
+from dextron_bench.leaderboard import add, build
 from dextron_bench.leaderboard.submission import entry
+from tests.helpers.forged_bundles import Forgery
 
 
-@pytest.mark.parametrize("name", ["exp", "Exp", "rlil-0.3", "RLIL-0.1-mine", "exp\n", "first", "FIRST"])
+@pytest.mark.parametrize(
+    "name",
+    ["exp", "Exp", "rlil-0.3", "RLIL-0.1-mine", "exp\n", "first", "FIRST", "rlil_0.1", "exp.", "F1RST", "f-irst"],
+)
 def test_names_that_equal_or_resemble_another_are_refused(name: str, tmp_path: Path):
     (tmp_path / "results" / "first" / "real" / "seed0").mkdir(parents=True)
     with pytest.raises(entry.BadSubmission):
         add.check_name(name, "synthetic", tmp_path, replace=True)
     add.check_name("first-of-mine", "synthetic", tmp_path, replace=False)
+
+
+def test_the_board_changes_in_one_step_and_nothing_else_is_left(
+    forged: Forgery, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The copy that is built lies beside the board, since a rename works on one disk only."""
+    verdict, board, temporary = forged.checked(), tmp_path / "board", tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    (tmp_path / ".board.part/results/near/synthetic/seed7").mkdir(parents=True)  # From an addition that was killed.
+    built = add.merge(verdict, board)
+    assert {file.name for file in built} >= {"table.csv", "README.md", "index.html"}
+    assert all(file.is_file() for file in built)
+    seeds = sorted(path.name for path in (board / "results/near/synthetic").iterdir())
+    assert seeds == ["bundle.json", "seed0", "seed1"]
+    before = {file: file.read_bytes() for file in board.rglob("*") if file.is_file()}
+
+    def build_and_fail(part: Path) -> list[Path]:
+        real_build(part)
+        assert {file: file.read_bytes() for file in board.rglob("*") if file.is_file()} == before
+        raise KeyboardInterrupt
+
+    real_build = build.build
+    monkeypatch.setattr(build, "build", build_and_fail)
+    with pytest.raises(KeyboardInterrupt):
+        add.merge(verdict, board)
+    assert {file: file.read_bytes() for file in board.rglob("*") if file.is_file()} == before
+    assert not list(temporary.iterdir())
+    assert not list(tmp_path.glob(".board*"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -99,3 +100,18 @@ def test_the_tier_stays_until_the_scores_change(here: Path):
     file.write_text(json.dumps(verified))
     assert build("--runs", "runs") == 0
     assert "tier" not in json.loads(file.read_text())
+
+
+def test_no_cell_of_the_table_is_a_formula_and_nothing_hidden_is_published(here: Path):
+    assert build("--runs", "runs") == 0
+    file = here / "board/results/nothing/synthetic/seed0/result.json"
+    result = json.loads(file.read_text())
+    result["provenance"]["machine"] = {"cpu": '=HYPERLINK("http://x")\x1b[2J\u202e', "cores": None}
+    file.write_text(json.dumps(result))
+    assert build() == 0
+    (cell,) = {
+        row["hardware"] for row in csv.DictReader((here / "board/table.csv").open()) if row["method"] == "nothing"
+    }
+    assert cell == '\'=HYPERLINK("http://x")\\x1b[2J\\u202e'
+    for name in ("table.csv", "README.md", "index.html"):
+        assert not {"\x1b", "\u202e"} & set((here / "board" / name).read_text())

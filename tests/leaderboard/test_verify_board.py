@@ -10,6 +10,7 @@ import pytest
 
 from dextron_bench import recording
 from dextron_bench.cli import main
+from dextron_bench.storage import folders
 
 
 def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
@@ -43,7 +44,7 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     printed = capsys.readouterr().out
     assert printed.count("│ mine ") == printed.count("│ other ") == 2  # On `test` and `unseen-reach`.
     file = tmp_path / "board/results/mine/synthetic/seed0/result.json"
-    file.write_text(file.read_text().replace("0.0", "20.0", 1))
+    file.write_text(file.read_text().replace("20.0", "0.0", 1))
     assert main.main(["leaderboard", "verify", "--all", "--board", "board"]) == 1
     printed = capsys.readouterr().out
     assert "DIFFERS from its episodes" in printed
@@ -70,11 +71,14 @@ def test_missing_and_additional_seeds_on_the_board_are_problems(
 def test_an_interrupted_addition_can_be_repeated(submitted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     board, words = tmp_path / "board", ["leaderboard", "add", str(submitted / "near.zip"), "--board"]
     assert main.main([*words, str(board)]) == 0
+    before = {file: file.read_bytes() for file in board.rglob("*") if file.is_file()}
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        patch.setattr(folders, "_put", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         assert main.main([*words, str(board), "--replace"]) == 130
+    assert {file: file.read_bytes() for file in board.rglob("*") if file.is_file()} == before
     assert main.main([*words, str(board), "--replace"]) == 0
     assert sorted(place.name for place in (board / "results/near").iterdir()) == ["synthetic"]
+    assert not (tmp_path / ".board.part").exists()
 
 
 def test_view_records_any_episode_of_a_bundle(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +49,33 @@ def test_the_file_appears_only_when_it_is_complete(tmp_path: Path):
 
     atomic.write_atomically(file, write)
     assert file.read_text() == "new"
+
+
+def test_what_a_killed_write_left_is_removed_by_the_next_write_of_the_same_file(tmp_path: Path):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    left, running, others = (f".a.txt.{ended.pid}.part", f".a.txt.{os.getppid()}.part", f".b.txt.{ended.pid}.part")
+    for name in (left, running, others):
+        (tmp_path / name).write_text("half")
+    atomic.write_atomically(tmp_path / "a.txt", lambda part: part.write_text("new"))
+    assert sorted(os.listdir(tmp_path)) == sorted(["a.txt", running, others])
+
+
+def test_file_and_folder_are_synced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A rename is on the disk only when its folder is."""
+    synced = []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(os.readlink(f"/proc/self/fd/{descriptor}")))
+    atomic.write_json(tmp_path / "a.json", {})
+    assert synced == [str(tmp_path / f".a.json.{os.getpid()}.part"), str(tmp_path)]
+
+
+def test_a_full_disk_names_the_file(tmp_path: Path):
+    def fail(part: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(OSError, match="No space") as caught:
+        atomic.write_atomically(tmp_path / "a.txt", fail)
+    assert caught.value.filename == str(tmp_path / "a.txt")
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import subprocess
+from importlib.resources import files
+from pathlib import Path
 
+import jsonschema
 import pytest
 
 from dextron_bench.storage import provenance
@@ -30,3 +33,56 @@ def test_without_git_the_commit_is_unknown(monkeypatch: pytest.MonkeyPatch):
 
     monkeypatch.setattr(subprocess, "run", missing)
     assert provenance._git("rev-parse", "HEAD") is None
+
+
+X86 = """processor\t: 0
+model name\t: AMD EPYC 7B13
+flags\t\t: fpu mmx smep sse sse2 misalignsse pni ssse3 fma sse4_2 aes avx f16c avx2 vaes avx512f avx512_vnni
+processor\t: 1
+flags\t\t: none"""
+ARM = "processor : 0\nFeatures : fp asimd evtstrm aes crc32 asimdhp sve sve2 sme smei16i64\nCPU part : 0xd40"
+
+
+@pytest.mark.parametrize(
+    ("text", "cpu", "extensions"),
+    [
+        (
+            X86,
+            "AMD EPYC 7B13",
+            ["avx", "avx2", "avx512_vnni", "avx512f", "f16c", "fma", "sse", "sse2", "sse4_2", "ssse3"],
+        ),
+        (ARM, None, ["asimd", "asimdhp", "sme", "smei16i64", "sve", "sve2"]),
+        ("processor : 0\nisa\n: rv64imafdc", None, None),
+    ],
+    ids=["x86", "arm", "neither"],
+)
+def test_the_machine_has_its_vector_extensions(
+    text: str, cpu: str | None, extensions: list[str] | None, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(Path, "read_text", lambda *_, **__: text)
+    machine = provenance.collect("")["machine"]
+    assert machine["vector_extensions"] == extensions
+    assert machine["cpu"] == (cpu or provenance.platform.processor() or provenance.platform.machine())
+
+
+def test_a_system_that_does_not_describe_its_processor_has_no_vector_extensions(monkeypatch: pytest.MonkeyPatch):
+    def missing(*_: object, **__: object) -> str:
+        raise FileNotFoundError("/proc/cpuinfo")
+
+    monkeypatch.setattr(Path, "read_text", missing)
+    assert provenance.vector_extensions() is None
+    assert provenance.collect("")["machine"]["cpu"]
+
+
+@pytest.mark.parametrize("extensions", ["as here", "unknown", "of an earlier version"])
+def test_bundles_may_have_any_provenance_that_was_ever_written(extensions: str):
+    schema = json.loads(files("dextron_bench").joinpath("data/result.schema.json").read_text())
+    content = provenance.collect(model.mjcf_hash())
+    if extensions == "unknown":
+        content["machine"]["vector_extensions"] = None
+    elif extensions == "of an earlier version":
+        del content["machine"]["vector_extensions"]
+    jsonschema.validate(content, schema["properties"]["provenance"])
+    content["machine"]["vector_extensions"] = ["<b>"]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(content, schema["properties"]["provenance"])

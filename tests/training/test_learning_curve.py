@@ -63,5 +63,5 @@ def test_a_damaged_snapshot_is_named(tmp_path: Path):
     checkpoints = train(tmp_path / "a")
     checkpoints.snapshot(2, 0).write_bytes(b"not weights")
     checkpoints.snapshot(2, 0).with_name("seed0-val1.json").unlink()
-    with pytest.raises(DamagedFile, match=r"epoch-0002/seed0\.safetensors is damaged"):
+    with pytest.raises(DamagedFile, match=r"is damaged \(weights/epoch-0002/seed0\.safetensors has another SHA-256"):
         train(tmp_path / "a")

@@ -12,7 +12,7 @@ from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.storage import atomic, tensors
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
-from dextron_bench.training import learning_curve
+from dextron_bench.training import learning_curve, loop
 from dextron_bench.training.checkpoints import Busy, Checkpoints
 from dextron_bench.training.loop import Diverged
 from tests.helpers import tiny_training
@@ -148,6 +148,79 @@ def test_a_damaged_file_of_a_training_is_named(tmp_path: Path, name: str):
     with pytest.raises(DamagedFile, match=r"is damaged .*; remove it and run again") as caught:
         train(folder, Toy(preset="quick", breaks=5))
     assert str(folder) in str(caught.value)
+
+
+BREAKS = Toy(preset="quick", breaks=5)
+BELONGING = ["journals/000002.safetensors", "weights/epoch-0002/seed3.safetensors", "checkpoint.safetensors"]
+
+
+class CurveThatEnds(learning_curve.Curve):
+    """Ends the process after the checkpoint of epoch 4."""
+
+    def last_point(self) -> dict[int, float]:
+        if 4 in self._checkpoints.epochs():
+            raise Killed
+        return super().last_point()
+
+
+@pytest.mark.parametrize("name", [*BELONGING, "metrics.jsonl"])
+def test_a_lost_file_of_an_unfinished_training_is_named(tmp_path: Path, name: str):
+    folder = half_done(tmp_path / "a")
+    (folder / name).unlink()
+    before = tiny_training.contents(folder)
+    with pytest.raises(DamagedFile, match=r"a is damaged \(.*; remove it and run again") as caught:
+        train(folder, BREAKS)
+    assert name in str(caught.value)
+    assert tiny_training.contents(folder) == before
+
+
+@pytest.mark.parametrize("name", [*BELONGING, "metrics.jsonl"])
+def test_a_flipped_bit_in_a_file_of_an_unfinished_training_is_noticed(tmp_path: Path, name: str):
+    """Without the list of the checkpoint, most of these bits change the weights and nothing else."""
+    folder = half_done(tmp_path / "a")
+    content = (folder / name).read_bytes()
+    for place in (len(content) // 3, len(content) * 2 // 3, len(content) - 9):
+        flipped = bytearray(content)
+        flipped[place] ^= 1
+        (folder / name).write_bytes(flipped)
+        with pytest.raises(DamagedFile, match=r"a is damaged \(.*; remove it and run again"):
+            train(folder, BREAKS)
+
+
+def test_metrics_that_are_cut_in_their_last_counted_line_are_noticed(tmp_path: Path):
+    file = half_done(tmp_path / "a") / "metrics.jsonl"
+    file.write_bytes(file.read_bytes()[:-9])
+    with pytest.raises(DamagedFile, match=r"metrics\.jsonl ends before line 8"):
+        train(tmp_path / "a", BREAKS)
+
+
+def test_a_journal_of_another_training_is_not_used(tmp_path: Path):
+    folder = half_done(tmp_path / "a")
+    journal = folder / "journals/000002.safetensors"
+    journal.with_name("000003.safetensors").write_bytes(journal.read_bytes())
+    with pytest.raises(DamagedFile, match=r"journals/000003\.safetensors does not belong to its checkpoint"):
+        train(folder, BREAKS)
+
+
+def test_a_snapshot_that_is_lost_after_the_training_is_noticed(tmp_path: Path):
+    checkpoints = train(tmp_path / "a")
+    checkpoints.snapshot(4, 0).unlink()
+    with pytest.raises(DamagedFile, match=r"weights/epoch-0004/seed0\.safetensors is missing"):
+        train(tmp_path / "a")
+
+
+def test_a_checkpoint_of_an_earlier_version_without_a_list_continues(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    train(tmp_path / "unbroken")
+    folder = tmp_path / "a"
+    with monkeypatch.context() as patched:
+        patched.setattr(loop, "Curve", CurveThatEnds)
+        with pytest.raises(Killed):
+            train(folder)
+    file = folder / "checkpoint.safetensors"
+    about = {name: tensors.read_about(file)[name] for name in ("epoch", "epochs", "device")}
+    tensors.write(file, tensors.read(file), about)
+    train(folder)
+    assert tiny_training.contents(folder) == tiny_training.contents(tmp_path / "unbroken")
 
 
 def test_other_settings_or_another_device_do_not_continue(tmp_path: Path):

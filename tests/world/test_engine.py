@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from dextron_bench.reaches.reach import PALM_AHEAD
 from dextron_bench.world import model, task
-from dextron_bench.world.engine import Engine
+from dextron_bench.world.engine import STATE_BOUND, Engine
 from tests.helpers.short_reaches import SETTINGS, SOURCE, PlayedEpisode, actions, played
 
 
@@ -117,3 +121,55 @@ def test_states_are_copies():
     np.testing.assert_array_equal(first, kept)
     step.states[:] = 7.0
     assert engine.states(slot)[0, 2] != 7.0
+
+
+@pytest.mark.parametrize("value", [1e11, -1e11, np.nan, np.inf])
+@pytest.mark.parametrize("entry", [2, 8, 20, 40], ids=["bottle's height", "palm", "finger", "finger's velocity"])
+def test_a_simulation_that_diverges_ends_its_episode_and_no_other(entry: int, value: float):
+    """MuJoCo resets such a simulation by itself, so that a state that looks sound would go on."""
+    engine, slots = Engine(3, threads=2), np.array([2, 0, 1])
+    engine.begin(slots, [SOURCE.path(SETTINGS[k]) for k in (0, 1, 3)])
+    for t in range(20):
+        step = engine.step(slots, np.array([actions(k)[t] for k in (0, 1, 3)]))
+        assert not step.diverged.any()
+    state_array(engine)[0, entry] = value
+    step = engine.step(slots, np.array([actions(k)[20] for k in (0, 1, 3)]))
+    assert step.diverged.tolist() == [False, True, False]
+    assert (step.ended.tolist(), step.terminated.tolist()) == ([False, True, False], [False, True, False])
+    assert step.rewards.tolist() == [0.0, 0.0, 0.0]
+    assert np.isfinite(step.states).all()
+    assert step.states[0].tobytes() == played(0).states[21].tobytes()
+    assert step.states[2].tobytes() == played(3).states[21].tobytes()
+    assert_bit_equal(play(engine, [3], np.array([0]))[3], played(3))  # Its slot plays the next episode as ever.
+
+
+def state_array(engine: Engine) -> np.ndarray:
+    """The positions and velocities (slots, 48) of an engine, which a test can overwrite."""
+    return engine._batch.state[:, 1 : 1 + model.STATE]  # After the time.
+
+
+def test_a_number_beyond_the_bound_after_the_last_physics_step_is_a_divergence():
+    engine, slot = Engine(1, threads=1), np.array([0])
+    engine.begin(slot, [SOURCE.path(SETTINGS[0])])
+    state_array(engine)[0, 25 + 2] = 0.9999 * STATE_BOUND  # [m/s] of the bottle: 1e10 m in 50 control steps.
+    steps = [engine.step(slot, np.zeros((1, 1))) for _ in range(52)]
+    assert not any(step.diverged[0] for step in steps[:45])
+    first = next(step for step in steps if step.diverged[0])
+    assert first.rewards[0] == 0.0
+    assert all(np.abs(step.states).max() <= STATE_BOUND for step in steps)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda engine: pickle.loads(pickle.dumps(engine))])
+def test_a_copy_continues_every_episode_like_its_original(copied: Callable[[Engine], Engine]):
+    engine, slots = Engine(2, threads=1), np.array([0, 1])
+    engine.begin(slots, [SOURCE.path(SETTINGS[3]), SOURCE.path(SETTINGS[4])])
+    for t in range(80):
+        engine.step(slots, np.stack([actions(3)[t], actions(4)[t]]))
+    other = copied(engine)
+    for t in range(80, 110):
+        commands = np.stack([actions(3)[t], actions(4)[t]])
+        step = engine.step(slots, commands)
+        again = other.step(slots, commands)
+        assert step.states.tobytes() == again.states.tobytes()
+        assert step.rewards.tolist() == again.rewards.tolist()
+    assert engine.states(slots[:1])[0].tobytes() == played(3).states[110].tobytes()

@@ -11,8 +11,9 @@ from dm_control.rl import control
 
 from dextron_bench.reaches.sources import UnknownSource
 from dextron_bench.world import model, suite
+from dextron_bench.world.engine import STATE_BOUND
 from dextron_bench.world.environment import ActionError
-from tests.helpers.short_reaches import SETTINGS, SOURCE, actions, played
+from tests.helpers.short_reaches import SETTINGS, SOURCE, TORN, TORN_POSE, TornSource, actions, played
 
 
 def episode(env: control.Environment, rng: np.random.Generator) -> Iterator[dm_env.TimeStep]:
@@ -142,3 +143,32 @@ def test_errors_for_invalid_arguments_list_the_valid_ones():
         suite.load("sintetic")
     with pytest.raises(ValueError, match="empty list"):
         suite.load(SOURCE, [])
+
+
+def test_a_simulation_that_diverges_ends_its_episode_with_a_named_failure():
+    env = suite.load(TornSource(), [TORN, SETTINGS[3]])
+    env.reset()
+    steps = [env.step(np.zeros(1)) for _ in range(TORN_POSE)]
+    assert [step.last() for step in steps] == [False] * (TORN_POSE - 1) + [True]
+    assert (steps[-1].reward, steps[-1].discount) == (0.0, 0.0)
+    assert np.isfinite(steps[-1].observation["state"]).all()
+    assert env.task.failure == "the simulation diverged"  # pyright: ignore[reportAttributeAccessIssue]
+    step = env.reset()
+    assert env.task.failure == ""  # pyright: ignore[reportAttributeAccessIssue]
+    for t, reward in enumerate(played(3).rewards):
+        assert step.observation["state"].tobytes() == played(3).states[t].tobytes()
+        step = env.step(actions(3)[t])
+        assert step.reward == reward
+    assert step.last()
+
+
+def test_a_number_beyond_the_bound_after_the_last_physics_step_is_a_divergence():
+    physics = suite.Physics.load()
+    physics.data.qvel[2] = 0.9999 * STATE_BOUND  # [m/s] of the bottle: 1e10 m in 50 control steps.
+    diverged = []
+    for _ in range(52):
+        physics.step(model.substeps())
+        diverged.append(physics.diverged)
+        assert np.abs(physics.states()).max() <= STATE_BOUND
+    assert diverged.index(True) >= 45
+    assert sum(diverged) == 1

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from html import escape
 
+from dextron_bench.storage.printable import printable
+
 VOID = {"line", "rect"}  # Elements of SVG that are written without an end tag.
 
 
@@ -26,9 +28,13 @@ def tag(name: str, /, *contents: Content, **attributes: Content) -> Html:
 
 def join(*contents: Content) -> Html:
     """Concatenates contents: escapes those that are not Html and leaves out None."""
-    return Html("".join(part if isinstance(part, Html) else escape(str(part)) for part in contents if part is not None))
+    return Html("".join(part if isinstance(part, Html) else _escape(part) for part in contents if part is not None))
+
+
+def _escape(value: Content) -> str:
+    return escape(printable(str(value)))
 
 
 def _attribute(key: str, value: Content) -> str:
     name = key.rstrip("_").replace("_", "-")
-    return name if value == "" else f'{name}="{escape(str(value))}"'
+    return name if value == "" else f'{name}="{_escape(value)}"'

@@ -21,7 +21,8 @@ class Entry:
     """A row of the table: `scores` has the leaderboard's columns; other fields are None if they are unknown.
 
     `role` names ceilings and floors, `frames` counts the training frames, `seconds` is the time of training,
-    `privileged` names the declared access beyond the state.
+    `privileged` names the declared access beyond the state. `equal` says how many episodes of a submission were equal
+    bit for bit when they were replayed.
     """
 
     method: str
@@ -36,6 +37,7 @@ class Entry:
     seconds: float | None = None
     hardware: str | None = None
     privileged: str | None = None
+    equal: str | None = None
 
 
 # Numbers in the paper's text (sections Simulations, Results, Discussion); none is read off a figure.
@@ -93,6 +95,7 @@ def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
         seconds=_largest(part.get("seconds") for part in (*trainings, *runs)),
         hardware=" / ".join(dict.fromkeys(filter(None, map(_hardware, results)))) or None,
         privileged=_privileged(row["method"], results),
+        equal=_equal(results),
     )
 
 
@@ -117,6 +120,15 @@ def _trained_by(row: dict[Any, Any], trainings: Sequence[dict[str, Any]]) -> str
         if (label, reaches) != (row["method"], row["reaches"]):
             return f"policy of {label}, trained on {reaches}"
     return None
+
+
+def _equal(results: Sequence[Result]) -> str | None:
+    """How many episodes of a submission equal their replay bit for bit; None for other rows."""
+    replays = [result["replay"] for result in results if result.get("replay")]
+    if not replays:
+        return None
+    equal, episodes = (sum(replay[name] for replay in replays) for name in ("equal", "episodes"))
+    return f"{equal:,} of {episodes:,} equal"
 
 
 def _largest(values: Iterable[Any]) -> Any:

@@ -48,7 +48,7 @@ def _columns(names: set[str], links: Links) -> list[Column]:
         ),
         Column("reaches", lambda entry: entry.reaches, lambda entry: entry.reaches),
         Column("split", lambda entry: entry.split, _split),
-        Column("tier", lambda entry: entry.tier, lambda entry: tag("span", entry.tier, class_="tier")),
+        Column("tier", lambda entry: entry.tier, _tier),
         Column("seeds", _score("seeds"), lambda entry: _count(entry.scores.get("seeds")), True),
         Column("frames", lambda entry: entry.frames, lambda entry: _count(entry.frames), True, "trained on"),
         Column("demos", lambda entry: entry.demonstrations, lambda entry: _count(entry.demonstrations), True, "used"),
@@ -91,6 +91,10 @@ def _method(entry: Entry) -> Html:
     mark = "quoted" if entry.tier == QUOTED else entry.role
     note = tag("small", entry.note) if entry.note else None
     return join(tag("span", entry.method, class_="name"), tag("span", mark, class_="mark") if mark else None, note)
+
+
+def _tier(entry: Entry) -> Html:
+    return join(tag("span", entry.tier, class_="tier"), tag("small", entry.equal) if entry.equal else None)
 
 
 def _split(entry: Entry) -> str:

@@ -11,9 +11,10 @@ import re
 import stat
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,11 @@ import jsonschema
 from jsonschema.exceptions import best_match
 
 from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage.printable import first_hidden
 from dextron_bench.storage.run_folder import RunFolder
 
 FORMAT = 1
+MOST_SEEDS = 10
 MANIFEST = "bundle.json"
 MEMBER = re.compile(
     r"bundle\.json|agent/[A-Za-z0-9][\w.+-]*\.(?:py|pt|onnx|safetensors)"
@@ -89,16 +92,29 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
 
 
 def check(value: Any, schema: str, file: Path) -> None:
-    """Raises BadBundle if a JSON value does not follow a shipped schema, or holds text that cannot be encoded."""
+    """Raises BadBundle if a JSON value does not follow a shipped schema, or holds text that cannot be printed."""
     try:
         json.dumps(value, ensure_ascii=False, allow_nan=False).encode()
     except ValueError as error:
         raise BadBundle(f"{file}: the {schema} has invalid text or numbers ({error})") from error
+    for text in _texts(value):
+        if character := first_hidden(text):
+            raise BadBundle(f"{file}: the {schema} has invalid text: it has the character {character!r}")
     error = best_match(_schema(schema).iter_errors(value))
     if error:
         place = "/".join(map(str, error.absolute_path)) or "an entry"
         message = error.message if len(error.message) < 200 else f"{error.message[:200]}..."
         raise BadBundle(f"{file}: {place} in the {schema} is invalid: {message}")
+    if schema == "bundle" and len(value["seeds"]) > MOST_SEEDS:
+        raise BadBundle(f"{file} has {len(value['seeds'])} seeds; a submission has at most {MOST_SEEDS}")
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Every text in a JSON value, names of entries too."""
+    if isinstance(value, str):
+        yield value
+    for part in chain(value, value.values()) if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _texts(part)
 
 
 def check_agent(files: Mapping[str, Path]) -> None:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.leaderboard.submission import bundle, names
 from dextron_bench.leaderboard.submission.declaration import Declaration
 from dextron_bench.methods import registry
 from dextron_bench.methods.isolation.launch import Launch, prepare_launch
@@ -55,8 +56,10 @@ class Entry:
     trust: bool = False  # A policy's file may start without a sandbox.
 
     def __post_init__(self) -> None:
-        if self.name.casefold().split("-")[0] in registry.installed_methods():
-            raise BadSubmission(f"the name {self.name!r} begins like the name of an installed method; choose another")
+        if other := names.imitated(self.name, registry.installed_methods()):
+            raise BadSubmission(f"the name {self.name!r} looks like the name of the method {other!r}; choose another")
+        if len(self.seeds) > bundle.MOST_SEEDS:
+            raise BadSubmission(f"a submission has at most {bundle.MOST_SEEDS} seeds, not {len(self.seeds)}")
         if sorted(self.seeds) != list(range(len(self.seeds))):
             raise BadSubmission("seeds must be 0, 1, 2 and so on, so that nobody can choose the best: --seed 0 1 2")
         if not registry.NAME.fullmatch(self.name) or len(self.name) > 64:

@@ -19,6 +19,7 @@ from dextron_bench.storage.progress import Progress, no_progress
 TOLERANCE = 1e-3  # Largest difference of a number in the last state on another platform.
 AGREEING = 0.99  # Share of episodes that must end alike on another platform.
 EXACT = ("length", "terminated", "truncated", "success", "score", "cause", "closing_lag", "trace")
+ALIKE = ("success", "score", "length", "failure")  # Equal on another platform, too.
 WORDS = {
     "length": "number of steps", "score": "return", "cause": "cause of failure", "closing_lag": "closing lag",
     "trace": "hash of states, actions and rewards",
@@ -34,7 +35,7 @@ class Replayed:
     rows: pd.DataFrame
     episodes: int = 0
     exact: int = 0  # Episodes equal bit for bit.
-    alike: int = 0  # Episodes with the same success, length and failure, and a last state within TOLERANCE.
+    alike: int = 0  # Episodes with the same outcome (ALIKE) and a last state within TOLERANCE.
     differing: list[str] = field(default_factory=list)  # A line for each episode that is not exact.
 
 
@@ -84,7 +85,7 @@ def _equal(computed: Any, claimed: Any) -> bool:
 
 def _alike(computed: dict[str, Any], claimed: dict[str, Any]) -> bool:
     """True if two episodes end alike."""
-    same = all(_equal(computed[name], claimed[name]) for name in ("success", "length", "failure"))
+    same = all(_equal(computed[name], claimed[name]) for name in ALIKE)
     distance = np.abs(np.asarray(computed["final"]) - np.asarray(claimed["final"], float)).max()
     return same and bool(distance <= TOLERANCE)
 

@@ -9,6 +9,8 @@ import numpy as np
 
 from dextron_bench.storage import provenance
 
+RETURN_TOLERANCE = 0.2  # Largest difference of a mean return, of 20, on another platform.
+
 
 def same_platform(claimed: dict[str, Any]) -> bool:
     """True if a provenance names the platform of this machine: episodes must then be equal bit for bit."""
@@ -30,12 +32,22 @@ def differences(result: dict[str, Any], computed: dict[str, Any]) -> Iterator[st
     for name in ("method", "reaches", "seed", "provenance"):
         if result[name] != computed[name]:
             yield f"its result says {name} {result[name]!r}, not {computed[name]!r}"
+    if result.get("declared", computed["declared"]) != computed["declared"]:
+        yield "its result has other declarations than its manifest"
     for split in sorted(result["splits"].keys() | computed["splits"].keys()):
         claims, facts = result["splits"].get(split, {}), computed["splits"].get(split, {})
         for name in sorted(claims.keys() | facts.keys()):
             if claims.get(name) != facts.get(name):
                 row = _first_difference(claims.get(name), facts.get(name))
                 yield f"its result has {name} on {split} that its episodes do not give{row}"
+
+
+def distant_returns(result: dict[str, Any], computed: dict[str, Any]) -> Iterator[str]:
+    """A line for each split whose mean return differs from the computed one by more than RETURN_TOLERANCE."""
+    for split, scores in result["splits"].items():
+        claimed, replayed = (float(np.mean(part["scores"])) for part in (scores, computed["splits"][split]))
+        if abs(claimed - replayed) > RETURN_TOLERANCE:
+            yield f"its result has a mean return of {claimed:.2f} on {split}; played again it is {replayed:.2f}"
 
 
 def _first_difference(claimed: Any, computed: Any) -> str:

@@ -11,7 +11,7 @@ import pandas as pd
 from dextron_bench.evaluation.episodes import Episode, fingerprint
 from dextron_bench.leaderboard.submission import bundle, episode_tables, playing, relaunch, replay_check
 from dextron_bench.leaderboard.submission.recording_check import RecordingCheck
-from dextron_bench.leaderboard.submission.result_check import differences, same_platform
+from dextron_bench.leaderboard.submission.result_check import differences, distant_returns, same_platform
 from dextron_bench.leaderboard.submission.verdict import SeedFinding
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation.isolated_agent import Limits
@@ -43,20 +43,21 @@ class SeedCheck:
             finding.add(*faults)
             return finding
         lenient = not same_platform(result["provenance"])
-        recordings = RecordingCheck(self._run, self._claims(), _traces(table) if lenient else {}, report)
+        tolerance = replay_check.TOLERANCE if lenient else 0.0
+        recordings = RecordingCheck(self._run, self._claims(), tolerance, report)
         replayed = self._replay(table, recordings, threads, report)
         for problem in recordings.problems:
             finding.add(problem)
         finding.episodes, finding.exact, finding.table = replayed.episodes, replayed.exact, replayed.rows
-        finding.result = self._result(replayed.rows, result["provenance"])
+        finding.result = self._result(replayed, result["provenance"])
         finding.add(*self._provenance_faults(result))
-        self._compare(finding, replayed, result, lenient)
+        self._compare(finding, replayed, result, table if lenient else None)
         for name in recordings.without_row(self._traces):
             finding.add(f"recordings/{name} belongs to no row of the splits")
         return finding
 
     def rerun(self, limits: Limits, trust: bool, threads: int, report: Progress) -> SeedFinding:
-        """Runs the agent again, in the sandbox only without `trust`, and compares its episodes with the replayed ones."""
+        """Runs the agent again, without `trust` in the sandbox only, and compares its episodes with the replayed."""
         finding, differing = SeedFinding(self._seed), []
         source = sources.open_source(self._manifest["reaches"])
         total, done = sum(len(split.cases) for split in self._splits), 0
@@ -102,33 +103,42 @@ class SeedCheck:
         source = sources.open_source(self._manifest["reaches"])
         return replay_check.replay_table(source, self._splits, table, threads, replaying, observe)
 
-    def _result(self, rows: pd.DataFrame, provenance: dict[str, Any]) -> dict[str, Any]:
-        """The result computed from the episodes as they were played again."""
-        scores = result_files.scores_by_split(rows)
+    def _result(self, replayed: replay_check.Replayed, provenance: dict[str, Any]) -> dict[str, Any]:
+        """The result computed from the episodes as they were played again, and how many of them are equal."""
         return {
-            **self._claims(), "splits": scores, "provenance": provenance, "declared": self._manifest["declared"]
-        }  # fmt: skip
+            **self._claims(),
+            "splits": result_files.scores_by_split(replayed.rows),
+            "provenance": provenance,
+            "declared": self._manifest["declared"],
+            "replay": {"episodes": replayed.episodes, "equal": replayed.exact},
+        }
 
     def _provenance_faults(self, result: Mapping[str, Any]) -> Iterator[str]:
         if result["provenance"] != atomic.read_json(self._run.provenance):
             yield "its result has another provenance than its run"
 
     def _compare(
-        self, finding: SeedFinding, replayed: replay_check.Replayed, result: dict[str, Any], lenient: bool
+        self,
+        finding: SeedFinding,
+        replayed: replay_check.Replayed,
+        result: dict[str, Any],
+        foreign: pd.DataFrame | None,
     ) -> None:
-        """Adds how the result and the rows differ from the replay; on another platform, most episodes must agree."""
+        """Adds how the result and the rows differ from the replay.
+
+        `foreign` is the table if it was made on another platform: the result must then follow from that table, and the
+        table must agree with the replay in most episodes and in every mean return.
+        """
         assert finding.result is not None
         if replayed.exact == replayed.episodes:
             finding.add(*differences(result, finding.result))
-        elif not lenient or replayed.alike < replay_check.AGREEING * replayed.episodes:
+        elif foreign is None or replayed.alike < replay_check.AGREEING * replayed.episodes:
             finding.add(*replayed.differing)
         else:
+            claimed = result_files.scores_by_split(foreign.sort_values(["split", "row"]))
+            finding.add(*differences(result, {**finding.result, "splits": claimed}))
+            finding.add(*distant_returns(result, finding.result))
             finding.notes.append(
                 f"seed{self._seed}: made on another platform; of {replayed.episodes} episodes {replayed.exact} are "
                 f"equal bit for bit, {replayed.alike} end alike with a last state within {replay_check.TOLERANCE:g}"
             )
-
-
-def _traces(table: pd.DataFrame) -> dict[tuple[str, int], str]:
-    """The hash of each episode as the table has it, by split and row."""
-    return dict(zip(zip(table["split"], table["row"], strict=True), table["trace"], strict=True))

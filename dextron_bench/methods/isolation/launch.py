@@ -59,7 +59,8 @@ def prepare_launch(
     """How to start the agent that a text names (see `methods.specs`).
 
     `weights` is the file of a method that learns. Without `trust`, a policy's file (TorchScript, ONNX) starts in the
-    sandbox only, since nobody reads such a file before it runs. Raises AgentError if the text names no agent or a file is missing.
+    sandbox only, since nobody reads such a file before it runs. Raises AgentError if the text names no agent or a file
+    is missing.
     """
     try:
         spec = specs.parse(text)

@@ -27,6 +27,11 @@ def test_a_submission_has_its_declared_properties():
     assert row.tier == "replayed"
 
 
+def test_a_submission_says_how_many_episodes_equal_their_replay():
+    assert entry(tier="replayed", replay={"episodes": 1000, "equal": 998}).equal == "998 of 1,000 equal"
+    assert entry().equal is None
+
+
 def test_a_property_that_is_not_declared_is_unknown():
     row = entry(declared={"frames": None, "demonstrations": None, "hours": None, "hardware": "", "privileged": False})
     assert (row.frames, row.demonstrations, row.seconds, row.hardware) == (None, None, None, None)

@@ -7,11 +7,14 @@ import shutil
 import stat
 import warnings
 import zipfile
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from dextron_bench.leaderboard.submission import bundle, entry
+from dextron_bench.leaderboard.submission.declaration import Declaration
 from tests.helpers import tiny_benchmark
 
 
@@ -137,3 +140,25 @@ def test_a_zip_file_that_is_not_a_bundle_is_refused(tmp_path: Path):
         archive.writestr("bundle.json", '{"format": 1}')
     with pytest.raises(bundle.BadBundle, match="'name' is a required property"):
         bundle.unpack(tmp_path / "other.zip", tmp_path / "into")
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"name": "mine\n"}, "has the character '\\n'"),
+        ({"declared": {"notes": "\x1b[2J"}}, "has the character '\\x1b'"),
+        ({"declared": {"authors": "a\u202eb"}}, "has the character '\\u202e'"),
+        ({"agent": {"settings": {"a\u2066": 1}}}, "has the character '\\u2066'"),
+        ({"seeds": list(range(100))}, "has 100 seeds; a submission has at most 10"),
+    ],
+)
+def test_text_that_cannot_be_printed_and_many_seeds_are_refused(changes: dict[str, Any], why: str):
+    value: dict[str, Any] = {"format": 1, "name": "mine", "reaches": "synthetic", "seeds": [0], "files": {}}
+    value |= {"agent": {"kind": "method", "spec": "reflex", "settings": {}, "weights": ""}, "physics": "0" * 64}
+    value |= {"declared": asdict(Declaration())}
+    bundle.check(value, "bundle", Path("mine.zip"))
+    for name, new in changes.items():
+        value[name] = value[name] | new if isinstance(new, dict) else new
+    with pytest.raises(bundle.BadBundle) as caught:
+        bundle.check(value, "bundle", Path("mine.zip"))
+    assert why in str(caught.value)

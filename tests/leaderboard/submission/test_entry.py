@@ -23,9 +23,12 @@ def test_settings_of_an_installed_method_are_complete():
 @pytest.mark.parametrize(
     ("name", "seeds", "message"),
     [
-        ("rlil-mine", (0,), "'rlil-mine' begins like the name of an installed method"),
+        ("rlil-mine", (0,), "'rlil-mine' looks like the name of the method 'rlil'"),
         ("a/b", (0,), "'a/b' is not a valid name"),
         ("a" * 65, (0,), "is not a valid name: use up to 64 letters"),
+        ("OMEGA2", (0,), "looks like the name of the method 'omega'"),
+        ("mine\n", (0,), "is not a valid name"),
+        ("mine", tuple(range(11)), "at most 10 seeds, not 11"),
         ("mine", (1,), "seeds must be 0, 1, 2 and so on"),
         ("mine", (0, 2), "seeds must be 0, 1, 2 and so on"),
     ],

@@ -1,0 +1,50 @@
+"""The metrics of a training: one row for each epoch and seed, in a file to which rows are added."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage.atomic import DamagedFile
+
+METRICS = "metrics.jsonl"  # In the folder of a training.
+
+
+def append(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Adds rows at the end; they are on the disk afterwards."""
+    file = folder / METRICS
+    with atomic.naming(file), file.open("a", encoding="utf-8") as content:
+        content.write("".join(json.dumps(row, sort_keys=True) + "\n" for row in rows))
+        content.flush()
+        os.fsync(content.fileno())
+
+
+def read(folder: Path) -> list[dict[str, Any]]:
+    """All rows in order; raises DamagedFile."""
+    try:
+        rows = list(schemas.rows((folder / METRICS).read_bytes(), schemas.METRIC))
+    except OSError as error:
+        raise DamagedFile(folder, f"{METRICS}: {error}") from error
+    if None in rows:
+        raise DamagedFile(folder, f"{METRICS}: line {rows.index(None) + 1} does not hold the metrics of an epoch")
+    return [row for row in rows if row]
+
+
+def first(folder: Path, count: int) -> bytes:
+    """The first lines, as bytes; raises DamagedFile if some are missing."""
+    file = folder / METRICS
+    lines = file.read_bytes().splitlines(keepends=True)[:count] if file.exists() else []
+    if len(lines) < count or not all(line.endswith(b"\n") for line in lines):
+        raise DamagedFile(folder, f"{METRICS} ends before line {count}, and its checkpoint needs it")
+    return b"".join(lines)
+
+
+def cut(folder: Path, count: int) -> None:
+    """Removes all lines after the first ones; raises DamagedFile if some of these are missing."""
+    file, kept = folder / METRICS, first(folder, count)
+    if file.exists() and file.read_bytes() != kept:
+        atomic.write_atomically(file, lambda part: part.write_bytes(kept))

@@ -1,0 +1,121 @@
+"""Folders: hidden names are never listed, and a folder is replaced in one step or not at all."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dextron_bench.storage import folders
+
+ROOT = Path(__file__).parents[2]
+MAY_LIST = {  # Modules that list folders themselves, and why hidden names do no harm there.
+    "dextron_bench/storage/folders.py": "the home of `visible`",
+    "dextron_bench/storage/atomic.py": "looks for temporary files",
+    "dextron_bench/training/checkpoints.py": "looks for temporary files",
+    "dextron_bench/reaches/recorded/release.py": "every file of the release has a known SHA-256",
+    "dextron_bench/methods/isolation/sandbox.py": "lists what to hide",
+    "dextron_bench/leaderboard/submission/bundle.py": "names of members have a pattern",
+    "dextron_bench/leaderboard/submission/recording_check.py": "every recording is compared with its episode",
+    "dextron_bench/leaderboard/submission/starter.py": "asks whether a folder is empty",
+}
+KILLED = """
+import os, sys
+from pathlib import Path
+from dextron_bench.storage import folders
+if sys.argv[2] == "renames":
+    folders._exchange = lambda first, second: False
+steps = int(sys.argv[3])
+def step(event, arguments):
+    global steps
+    if event in ("open", "os.rename", "shutil.rmtree", "os.mkdir", "shutil.copytree", "ctypes.dlsym", "os.remove"):
+        steps -= 1
+        if steps < 0:
+            os._exit(9)
+sys.addaudithook(step)
+with folders.replacing(Path(sys.argv[1])) as part:
+    (part / "a.txt").write_text("new")
+    (part / "b.txt").write_text("new")
+"""
+
+
+def test_hidden_names_are_not_listed(tmp_path: Path):
+    root = tmp_path / ".hidden"  # A hidden folder that the caller names is no obstacle.
+    for name in ("b/x/c.txt", "a/x/c.txt", ".a.part/x/c.txt", "a/.x.old/c.txt", "a/x/.c.txt"):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).touch()
+    expected = [root / "a/x/c.txt", root / "b/x/c.txt"]
+    assert folders.visible(root, "*/*/c.txt") == folders.visible(root, "**/*.txt") == expected
+    assert folders.visible(tmp_path / "none", "*") == []
+
+
+def test_only_one_module_lists_folders():
+    def lists(file: Path) -> bool:
+        nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        calls = (node.func for node in nodes if isinstance(node, ast.Call))
+        names = {call.attr for call in calls if isinstance(call, ast.Attribute)}
+        return bool(names & {"glob", "rglob", "iterdir", "listdir", "scandir"})
+
+    files = [file for folder in ("dextron_bench", "baselines") for file in sorted((ROOT / folder).rglob("*.py"))]
+    listing = {file.relative_to(ROOT).as_posix() for file in files if lists(file)}
+    assert listing - MAY_LIST.keys() == set()
+
+
+def test_a_folder_changes_in_one_step(tmp_path: Path):
+    board = tmp_path / "board"
+    with folders.replacing(board) as part:  # There is no folder yet.
+        (part / "a.txt").write_text("old")
+        assert not board.exists()
+    with folders.replacing(board) as part:
+        (part / "a.txt").write_text("new")
+        (part / "b.txt").write_text("new")
+        assert [file.name for file in board.iterdir()] == ["a.txt"]
+        assert (board / "a.txt").read_text() == "old"
+    assert sorted(file.read_text() for file in board.iterdir()) == ["new", "new"]
+    assert os.listdir(tmp_path) == ["board"]
+
+
+@pytest.mark.parametrize("exchange", [True, False])
+def test_an_error_leaves_the_old_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exchange: bool):
+    if not exchange:
+        monkeypatch.setattr(folders, "_exchange", lambda first, second: False)
+    (tmp_path / "board").mkdir()
+    with pytest.raises(FileNotFoundError), folders.replacing(tmp_path / "board") as part:
+        (part / "a.txt").rename(part / "b.txt")
+    with folders.replacing(tmp_path / "board") as part:
+        (part / "b.txt").touch()
+    assert (os.listdir(tmp_path), os.listdir(tmp_path / "board")) == (["board"], ["b.txt"])
+
+
+def test_two_processes_do_not_replace_one_folder(tmp_path: Path):
+    with folders.replacing(tmp_path / "board") as part:
+        (part / "a.txt").touch()
+        with (
+            pytest.raises(folders.FolderBusy, match="another process is changing"),
+            folders.replacing(part.parent / "b"),
+        ):
+            pass
+    assert os.listdir(tmp_path) == ["board"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["exchange", "renames"])
+def test_a_process_killed_at_any_step_leaves_the_old_or_the_new_folder(tmp_path: Path, way: str):
+    board, steps, code = tmp_path / "board", 0, 9
+    seen = set()
+    while code == 9:
+        with folders.replacing(board) as part:  # Recovers, and puts the old content back.
+            (part / "a.txt").write_text("old")
+            (part / "b.txt").unlink(missing_ok=True)
+        command = [sys.executable, "-c", KILLED, str(board), way, str(steps)]
+        code = subprocess.run(command, check=False, cwd=ROOT).returncode
+        folders.recover(board)
+        seen.add(tuple(sorted((file.name, file.read_text()) for file in folders.visible(board, "*"))))
+        steps += 1
+    assert code == 0
+    assert seen == {(("a.txt", "old"),), (("a.txt", "new"), ("b.txt", "new"))}
+    assert steps > 8
