@@ -5,6 +5,7 @@ A bundle may come from a stranger, so reading one checks names, kinds, sizes and
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import re
@@ -21,13 +22,14 @@ from typing import Any
 import jsonschema
 from jsonschema.exceptions import best_match
 
-from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage import atomic, hashing, limited_process
 from dextron_bench.storage.printable import first_hidden
 from dextron_bench.storage.run_folder import RunFolder
 
 FORMAT = 1
 MOST_SEEDS = 10
 MANIFEST = "bundle.json"
+JSON_PROCESS = "dextron_bench.leaderboard.submission.json_process"
 MEMBER = re.compile(
     r"bundle\.json|agent/[A-Za-z0-9][\w.+-]*\.(?:py|pt|onnx|safetensors)"
     r"|seed\d{1,6}/(?:config\.json|provenance\.json|result\.json|recordings\.json|episodes\.parquet"
@@ -36,7 +38,8 @@ MEMBER = re.compile(
 )
 MEMBERS = 20_000  # The largest number of files.
 LARGEST = 256 * 2**20  # [bytes] of one unpacked file.
-LARGEST_MANIFEST = 4 * 2**20  # [bytes].
+LARGEST_JSON = 4 * 2**20  # [bytes] of a JSON file.
+MEMORY, SECONDS = 2 * limited_process.GIBIBYTE, 30.0  # [bytes], [s] of the process that checks a JSON file.
 TOTAL = 8 * 2**30  # [bytes] of all unpacked files.
 CHUNK = 2**20  # [bytes] that are copied at once.
 MEMBER_DATE = (1980, 1, 1, 0, 0, 0)  # The same for every member, so that equal contents make equal bundles.
@@ -79,7 +82,7 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
     try:
         with zipfile.ZipFile(file) as archive:
             members = _members(file, archive)
-            manifest = _manifest(file, _content(file, archive, members.get(MANIFEST)))
+            manifest = parse(_content(file, archive, members.get(MANIFEST)), "bundle", file)
             _check_files(file, set(members) - {MANIFEST}, set(manifest["files"]))
             for name, sha256 in manifest["files"].items():
                 if _extract(file, archive, members[name], into / name) != sha256:
@@ -89,6 +92,18 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
             f"{file} is not a complete zip file ({error}); make the bundle again with `dextron-bench submit`"
         ) from error
     return manifest
+
+
+def parse(content: bytes, schema: str, file: Path) -> dict[str, Any]:
+    """The JSON value of a file of a stranger, after a separate process has checked it; raises BadBundle."""
+    if len(content) > LARGEST_JSON:
+        raise BadBundle(f"{file}: the {schema} is larger than {LARGEST_JSON / 2**20:g} MiB")
+    done = limited_process.run(JSON_PROCESS, [schema, str(file)], content, MEMORY, SECONDS)
+    if done.code == 1 and done.output:
+        raise BadBundle(ast.literal_eval(done.output.decode()))
+    if done.code != 0:
+        raise BadBundle(f"{file}: the {schema} cannot be checked (the process that read it {done.ending})")
+    return json.loads(content)
 
 
 def check(value: Any, schema: str, file: Path) -> None:
@@ -145,7 +160,7 @@ def _members(file: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]
             raise BadBundle(f"{file}: {info.filename} is a link or encrypted")
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise BadBundle(f"{file}: {info.filename} uses a compression method whose output size cannot be limited")
-        if info.file_size > (LARGEST_MANIFEST if info.filename == MANIFEST else LARGEST):
+        if info.file_size > (LARGEST_JSON if info.filename.endswith(".json") else LARGEST):
             raise BadBundle(f"{file}: {info.filename} is too large when unpacked ({info.file_size / 2**20:.0f} MiB)")
         members[info.filename] = info
     return members
@@ -163,21 +178,12 @@ def _check_files(file: Path, present: set[str], listed: set[str]) -> None:
         raise BadBundle(f"{file} holds {extra[0]}, which its manifest does not list")
 
 
-def _manifest(file: Path, content: bytes) -> dict[str, Any]:
-    try:
-        manifest = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise BadBundle(f"{file}: {MANIFEST} is not valid JSON ({error})") from error
-    check(manifest, "bundle", file)
-    return manifest
-
-
 def _content(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo | None) -> bytes:
     if info is None:
         raise BadBundle(f"{file} is not a bundle: it lacks {MANIFEST}; `dextron-bench submit` makes one")
     with archive.open(info) as member:
-        content = member.read(LARGEST_MANIFEST + 1)
-    if len(content) > LARGEST_MANIFEST:
+        content = member.read(LARGEST_JSON + 1)
+    if len(content) > LARGEST_JSON:
         raise BadBundle(f"{file}: {info.filename} unpacks to more bytes than it states")
     return content
 
