@@ -99,7 +99,7 @@ KINDS = [  # The folder, the file in it, and the command that reads the file.
     ("search", "search.json", search),
     ("search", "blocks/000000.parquet", search),
 ]
-# Values that no other file repeats: another plausible value cannot be told from the first one (docs/leaderboard.md).
+# Another plausible value in these files is not noticed here: nothing beside them repeats the values.
 UNPROTECTED = ("result.json", "curve.json", "provenance.json", "timing.jsonl")
 
 
