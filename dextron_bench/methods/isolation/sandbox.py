@@ -16,6 +16,7 @@ from pathlib import Path
 
 PROGRAMS = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc/ld.so.cache", "/etc/alternatives")
 SIMULATORS = ("mujoco", "dm_control")  # Packages that are hidden.
+SYSTEM_LIBRARIES = ("/usr/lib", "/usr/local/lib")  # Where other interpreters have packages.
 SECRET = ("splits", "experts", "real", "synthetic")  # The package's data files that begin so hold settings or experts.
 LARGEST_FILE = 256 * 2**20  # [bytes] of a file that an agent may write; its stderr is one such file.
 # The last two options exist since bubblewrap 0.8.
@@ -98,4 +99,7 @@ def _installed() -> list[Path]:
 def _hidden(package: Path) -> list[Path]:
     """The folders of this package and of the simulators, which the sandbox replaces by empty ones."""
     names = (package.name, *SIMULATORS)
-    return [package, *(place for entry in _installed() for name in names if (place := entry / name).is_dir())]
+    roots = [Path(sys.base_prefix, "lib"), *(Path(folder) for folder in SYSTEM_LIBRARIES)]
+    others = [entry for root in roots for entry in root.glob("python3*/*-packages")]
+    entries = dict.fromkeys([*_installed(), *others])
+    return [package, *(place for entry in entries for name in names if (place := entry / name).is_dir())]
