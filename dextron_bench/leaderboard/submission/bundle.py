@@ -37,10 +37,13 @@ MEMBER = re.compile(
     re.ASCII,
 )
 MEMBERS = 20_000  # The largest number of files.
+LARGEST_DIRECTORY = 4 * 2**20  # [bytes] of the list of files in a zip.
 LARGEST = 256 * 2**20  # [bytes] of one unpacked file.
 LARGEST_JSON = 4 * 2**20  # [bytes] of a JSON file.
 MEMORY, SECONDS = 2 * limited_process.GIBIBYTE, 30.0  # [bytes], [s] of the process that checks a JSON file.
 TOTAL = 8 * 2**30  # [bytes] of all unpacked files.
+END, END_SIZE, ZIP64 = b"PK\5\6", 22, b"PK\6\7"  # The record at the end of a zip file; before it, one of large files.
+LARGEST_COMMENT = 2**16  # [bytes] after the end record.
 CHUNK = 2**20  # [bytes] that are copied at once.
 MEMBER_DATE = (1980, 1, 1, 0, 0, 0)  # The same for every member, so that equal contents make equal bundles.
 
@@ -80,6 +83,7 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
     Writes nothing outside the folder. Checks names, sizes and hashes before it parses the content of any file.
     """
     try:
+        _check_directory(file)
         with zipfile.ZipFile(file) as archive:
             members = _members(file, archive)
             manifest = parse(_content(file, archive, members.get(MANIFEST)), "bundle", file)
@@ -144,6 +148,18 @@ def check_agent(files: Mapping[str, Path]) -> None:
 def _schema(name: str) -> jsonschema.Draft202012Validator:
     text = files("dextron_bench.data").joinpath(f"{name}.schema.json").read_text(encoding="utf-8")
     return jsonschema.Draft202012Validator(json.loads(text))
+
+
+def _check_directory(file: Path) -> None:
+    """Raises BadBundle if the list of members, which is read as a whole, is longer than that of any bundle."""
+    with file.open("rb") as content:
+        content.seek(max(0, file.stat().st_size - END_SIZE - LARGEST_COMMENT - len(ZIP64) - 16))
+        tail = content.read()
+    last = len(tail) - END_SIZE  # Where `zipfile` looks first; then it takes the last record before a comment.
+    place = last if tail[last:].startswith(END) and tail.endswith(b"\0\0") else tail.rfind(END)
+    size = int.from_bytes(tail[place + 12 : place + 16], "little") if place >= 0 else 0
+    if size > LARGEST_DIRECTORY or tail[max(0, place - 20) :].startswith(ZIP64):
+        raise BadBundle(f"{file} lists more files than the {MEMBERS} that a bundle accepts")
 
 
 def _members(file: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:

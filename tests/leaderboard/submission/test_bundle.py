@@ -182,3 +182,16 @@ def test_a_check_of_json_that_takes_too_long_is_refused(monkeypatch: pytest.Monk
     monkeypatch.setattr(bundle, "SECONDS", 3.0)
     with pytest.raises(bundle.BadBundle, match="the process that read it took too long"):
         bundle.parse(b'{"seeds": [' + b"0," * 1_900_000 + b"0]}", "bundle", Path("mine.json"))
+
+
+def test_a_long_list_of_files_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    file = tmp_path / "many.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        for number in range(2000):
+            archive.writestr(f"agent/{number}.py", b"")
+    content = file.read_bytes()
+    file.write_bytes(content[:-6] + b"PK\5\6" + content[-2:])  # A second mark, inside the record.
+    monkeypatch.setattr(bundle, "LARGEST_DIRECTORY", 100_000)
+    monkeypatch.setattr(zipfile, "ZipFile", None)
+    with pytest.raises(bundle.BadBundle, match="lists more files than the 20000"):
+        bundle.unpack(file, tmp_path / "opened")
