@@ -151,7 +151,7 @@ def _schema(name: str) -> jsonschema.Draft202012Validator:
 
 
 def _check_directory(file: Path) -> None:
-    """Raises BadBundle if the list of members, which is read as a whole, is longer than that of any bundle."""
+    """Raises BadBundle if the list of members, which is read as a whole, is longer than in any bundle."""
     with file.open("rb") as content:
         content.seek(max(0, file.stat().st_size - END_SIZE - LARGEST_COMMENT - len(ZIP64) - 16))
         tail = content.read()
