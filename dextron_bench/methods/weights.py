@@ -123,4 +123,4 @@ def agent_by_name(name: str, reaches: str, seed: int = 0) -> tuple[str, Agent]:
 
 def _state_at_rest() -> np.ndarray:
     """A state (48,) without motion."""
-    return np.concatenate([model.half_closed(), np.zeros(model.STATE - len(model.half_closed()))])
+    return np.concatenate([model.initial_qpos(), np.zeros(model.STATE - len(model.initial_qpos()))])

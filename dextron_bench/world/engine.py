@@ -72,7 +72,7 @@ class Engine:
             self._positions[slot, :n], self._positions[slot, n:] = path.positions[:n], path.positions[n - 1]
             self._quaternions[slot, :n], self._quaternions[slot, n:] = path.quaternions[:n], path.quaternions[n - 1]
         self._batch.state[ids] = self._initial_state
-        qpos = np.tile(model.half_closed(), (len(ids), 1))
+        qpos = np.tile(model.initial_qpos(), (len(ids), 1))
         qpos[:, model.PALM_POSITION] = self._positions[ids, 0] + PALM_AHEAD
         qpos[:, model.PALM_QUATERNION] = self._quaternions[ids, 0]
         self._qpos[ids] = qpos

@@ -62,7 +62,7 @@ def command_gain() -> np.ndarray:
 
 
 @cache
-def half_closed() -> np.ndarray:
+def initial_qpos() -> np.ndarray:
     """Joint positions (25,) at the start of an episode, without the palm's pose, which the caller sets."""
     model = load()
     qpos = model.qpos0.copy()

@@ -94,7 +94,7 @@ class Grasp(control.Task):
         self.setting = self._settings.next(self._rng)
         self._path = self._settings.source.path(self.setting)
         physics.move_carrier(self._path, 0)
-        qpos = model.half_closed().copy()
+        qpos = model.initial_qpos().copy()
         qpos[model.PALM_POSITION] = self._path.positions[0] + PALM_AHEAD
         qpos[model.PALM_QUATERNION] = self._path.quaternions[0]
         physics.data.qpos[:] = qpos

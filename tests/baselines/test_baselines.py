@@ -29,7 +29,7 @@ KINDS: dict[str, Callable[[], Agent]] = {  # The agents of methods that need no 
 def states(n: int) -> np.ndarray:
     """States (n, 48) of half-closed hands, 0.1 to 0.4 m from the bottle."""
     rows = np.zeros((n, model.STATE))
-    rows[:, :25] = model.half_closed()
+    rows[:, :25] = model.initial_qpos()
     rows[:, 7] = np.linspace(-0.1, -0.4, n)
     return rows
 

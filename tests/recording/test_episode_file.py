@@ -34,7 +34,7 @@ PATH = reach.Path(np.zeros((5, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)))
 def episode(steps: int, seed: int = 0, **ends: Any) -> Episode:
     """An episode of random numbers around the first state, with the right shapes."""
     rng = np.random.default_rng(seed)
-    first = np.concatenate([model.half_closed(), np.zeros(23)])
+    first = np.concatenate([model.initial_qpos(), np.zeros(23)])
     states = first + rng.normal(0.0, 0.01, (steps + 1, model.STATE))
     ending = {"terminated": False, "truncated": True, **ends}
     return Episode(SETTING, states, rng.uniform(-1, 1, (steps, 1)), np.zeros(steps), **ending)

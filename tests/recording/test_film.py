@@ -21,7 +21,7 @@ SMALL = FilmStyle(64, 48)
 
 def lifting(count: int) -> np.ndarray:
     """States (count, 48) in which the bottle rises."""
-    states = np.tile(np.concatenate([model.half_closed(), np.zeros(23)]), (count, 1))
+    states = np.tile(np.concatenate([model.initial_qpos(), np.zeros(23)]), (count, 1))
     states[:, 2] += np.linspace(0.0, 0.2, count)
     return states
 

@@ -17,7 +17,7 @@ def test_the_pictured_grasp_succeeds() -> None:
 
 
 def test_a_pictured_hand_has_the_given_closure() -> None:
-    start = np.concatenate([model.half_closed(), np.zeros(23)])
+    start = np.concatenate([model.initial_qpos(), np.zeros(23)])
     joints, closed = model.proximal()
     np.testing.assert_allclose(stills.hand_alone(start, 0.25)[joints], closed / 4)
     np.testing.assert_array_equal(stills.hand_alone(start, model.HALF_CLOSED)[14:], start[14:])

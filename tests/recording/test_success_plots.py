@@ -27,7 +27,7 @@ CASE = Case(SETTINGS[0], Expert(1.2, 0.3), 0.1)
 
 def noise(steps: int) -> tuple[Episode, StepPredictions]:
     rng = np.random.default_rng(0)
-    states = np.concatenate([model.half_closed(), np.zeros(23)]) + rng.normal(0.0, 0.01, (steps + 1, model.STATE))
+    states = np.concatenate([model.initial_qpos(), np.zeros(23)]) + rng.normal(0.0, 0.01, (steps + 1, model.STATE))
     episode = Episode(SETTING, states, rng.uniform(-1, 1, (steps, 1)), np.zeros(steps), False, True)
     curves, chances, experts = rng.random((steps, 51)), rng.random(steps), rng.uniform(-1, 1, steps)
     return episode, StepPredictions(GRID, curves, chances, experts, duration=steps - 20.0)

@@ -14,7 +14,7 @@ HALF = np.sqrt(0.5)
 
 def states(n: int = 1) -> np.ndarray:
     """States (n, 48) at the start of an episode: the palm's origin at (0, -0.335, 0.2), unturned."""
-    return np.tile(np.concatenate([model.half_closed(), np.zeros(23)]), (n, 1))
+    return np.tile(np.concatenate([model.initial_qpos(), np.zeros(23)]), (n, 1))
 
 
 def trajectory(bottle: list[float], hand: list[float] | None = None) -> np.ndarray:
@@ -45,7 +45,7 @@ def test_every_digit_starts_half_closed_with_the_thumb_opposed():
         "thumb_distal": -0.2565,  # Coupled 0.9 to 1.
         **{f"{finger}_{part}": 0.785 for finger in model.DIGITS[1:] for part in ("proximal", "distal")},
     }
-    qpos = model.half_closed()
+    qpos = model.initial_qpos()
     measured = {name: float(qpos[model.load().joint(name).qposadr[0]]) for name in angles}
     assert measured == pytest.approx(angles)
 

@@ -75,7 +75,7 @@ def constants() -> dict[str, Any]:
     from dextron_bench.world import model
 
     joints, closed = model.proximal()
-    arrays = {"joints": joints, "closed": closed, "gain": model.command_gain(), "half_closed": model.half_closed()}
+    arrays = {"joints": joints, "closed": closed, "gain": model.command_gain(), "half_closed": model.initial_qpos()}
     return {**{name: array.tolist() for name, array in arrays.items()}, "state_names": model.state_names()}
 
 
@@ -90,7 +90,7 @@ def use_constants(values: dict[str, Any]) -> None:
     names = tuple(values["state_names"])
     model.proximal = lambda: (arrays["joints"], arrays["closed"])  # type: ignore[assignment]
     model.command_gain = lambda: arrays["gain"]  # type: ignore[assignment]
-    model.half_closed = lambda: arrays["half_closed"]  # type: ignore[assignment]
+    model.initial_qpos = lambda: arrays["half_closed"]  # type: ignore[assignment]
     model.state_names = lambda: names  # type: ignore[assignment]
 
 
@@ -98,7 +98,7 @@ def hide_simulator() -> None:
     """Removes the simulator from this process; caches the values that pure functions of states need from it."""
     from dextron_bench.world import model
 
-    for cached in (model.proximal, model.command_gain, model.half_closed, model.state_names):
+    for cached in (model.proximal, model.command_gain, model.initial_qpos, model.state_names):
         cached()
     model.load = model.mujoco = None  # type: ignore[assignment]
     package = vars(sys.modules["dextron_bench"])

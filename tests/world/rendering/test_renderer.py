@@ -12,7 +12,7 @@ from dextron_bench.world.rendering import renderer
 @pytest.fixture(scope="module")
 def start() -> np.ndarray:
     """The state (48,) with the hand half closed, beside the bottle."""
-    return np.concatenate([model.half_closed(), np.zeros(23)])
+    return np.concatenate([model.initial_qpos(), np.zeros(23)])
 
 
 def orange(picture: np.ndarray) -> int:

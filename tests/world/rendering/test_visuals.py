@@ -32,7 +32,7 @@ def test_the_visual_model_moves_like_the_physics_model() -> None:
     ends = []
     for compiled in (model.load(), visuals.visual_model()):
         data = mujoco.MjData(compiled)
-        data.qpos[:] = model.half_closed()
+        data.qpos[:] = model.initial_qpos()
         data.mocap_pos[0] = data.qpos[model.PALM_POSITION]
         data.ctrl[:] = [1.05, 1, 1, 1, 1, 1]
         mujoco.mj_step(compiled, data, nstep=200)
