@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dextron_bench.methods import registry, specs, weights
+from dextron_bench.methods.agents import as_agent_error
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
@@ -36,7 +37,7 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
         result = result_files.read_result(run.result)
         if provenance.physics_of(result) != model.mjcf_hash() or not _is_complete(result):
             continue
-        config = schemas.read(run.config, schemas.METHOD_CONFIG)
+        learner = _installed_learner(run, result)
         if run.curve.exists():
             schemas.read(run.curve, schemas.CURVE)  # What is damaged is not copied.
         copy = RunFolder(board / RESULTS / run.path.relative_to(runs))
@@ -44,7 +45,9 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
         atomic.write_json(copy.result, _with_tier(result, before))
         if run.curve.exists():
             _copy(run.curve, copy.curve)
-        _ship_weights(run, result, config)
+        if learner is not None:
+            file = f"seed{result['seed']}.safetensors"
+            _copy(run.weights, weights.shipped_folder(learner, result["reaches"]) / file)
         taken.append(copy.path)
     if not taken:
         raise NothingToPublish(
@@ -78,13 +81,23 @@ def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]
     return scores, (result.get("training") or {}).get("sha256")
 
 
-def _ship_weights(run: RunFolder, result: dict[str, Any], config: dict[str, Any]) -> None:
-    """Copies the weights of an installed learner to the folder of shipped weights; skips methods in a file."""
+def _installed_learner(run: RunFolder, result: dict[str, Any]) -> Learner | None:
+    """The learner whose weights ship with a result; None for a method in a file, and for one without own weights.
+
+    Raises DamagedFile, UnknownMethod, BadSettings, AgentError.
+    """
+    config = schemas.read(run.config, schemas.METHOD_CONFIG)
     if config["code"]["sha256"] or specs.parse(config["code"]["class"]).kind != "module":
-        return  # A config never makes the code of a file run.
+        return None  # A config never makes the code of a file run.
     method = registry.create(config["code"]["class"], config["settings"])
-    if isinstance(method, Learner):  # A policy transfer has no weights of its own.
-        _copy(run.weights, weights.shipped_folder(method, result["reaches"]) / f"seed{result['seed']}.safetensors")
+    with as_agent_error(f"method {config['code']['class']!r} with the settings in {run.config}"):
+        learns, label = isinstance(method, Learner), registry.label(method)
+    if label != result["method"]:
+        raise atomic.DamagedFile(run.config, f"it is of {label!r}, and the result is of {result['method']!r}")
+    if not learns:  # A policy transfer has no weights of its own.
+        return None
+    assert isinstance(method, Learner)
+    return method
 
 
 def _copy(file: Path, copy: Path) -> None:

@@ -1,26 +1,23 @@
 """A script that prints the properties of recordings, one line of JSON for each file.
 
-It runs in a process of its own, because a damaged file can abort the process that decodes it. It imports nothing of
-this package, so that it starts quickly. Each line of standard input is a file name in JSON. With the argument `whole`
-it decodes all of a file and not only the properties.
+It runs in a process of its own with limits, because a damaged file can abort the process that decodes it. It imports
+nothing of this package, so that it starts quickly. Each line of standard input is a file name in JSON. With the
+argument `whole` it decodes all of a file and not only the properties.
 """
 
 from __future__ import annotations
 
 import json
 import sys
-from contextlib import suppress
 from typing import Any
 
 from rerun.chunk import RrdReader
 
 PROPERTIES = "/__properties/"
-MEMORY = 4 << 30  # [bytes] of address space. With one flipped bit Rerun asked for 23 GB (rerun-sdk 0.41).
 
 
 def main() -> None:
     """Prints `null` when it is ready, and then applications and properties of each file, or the error."""
-    _bound_memory()
     print("null", flush=True)
     for line in sys.stdin:
         try:
@@ -40,13 +37,6 @@ def _describe(file: str, whole: bool) -> dict[str, Any]:
             cells = columns.to_pydict().items()
             group |= {name: cell[0][0] for name, cell in cells if not name.startswith("rerun.")}
     return {"applications": [entry.application_id for entry in reader.recordings()], "properties": properties}
-
-
-def _bound_memory() -> None:
-    with suppress(ImportError, OSError, ValueError):  # Not every system supports it.
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
 if __name__ == "__main__":

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,10 +13,13 @@ from dextron_bench.reaches.setting import Setting
 from dextron_bench.recording import reader_process
 from dextron_bench.recording.episode_file import ENDS, BrokenRecording, Recording, Value, read
 from dextron_bench.recording.rrd_file import APPLICATION, APPLICATIONS
+from dextron_bench.storage import limited_process
 
 NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Properties of every episode.
 PAIR = "pair"  # Property of a file with two episodes, which is only for the viewer.
 MAGIC, FOOT = b"RRF2", b"FOOT"  # An .rrd file starts with MAGIC and has FOOT before its last four bytes.
+MEMORY = 4 * limited_process.GIBIBYTE  # [bytes] of address space. With one flipped bit Rerun 0.41 asked for 23 GB.
+START, SECONDS = 60.0, 10.0  # [s] to start and for each file.
 HEAD = 12  # [bytes] size of an .rrd file's header.
 
 
@@ -111,17 +112,17 @@ def _format_fault(file: Path) -> str:
 
 def _describe(files: Sequence[Path], whole: bool) -> Iterator[dict[str, Any]]:
     """What the reader process prints for each file. If a file ends the process, a new one continues with the next."""
-    command = [sys.executable, "-P", reader_process.__file__, *(["whole"] if whole else [])]
     while files:
-        names = "".join(json.dumps(str(file)) + "\n" for file in files)
-        done = subprocess.run(command, input=names, capture_output=True, text=True, encoding="utf-8", check=False)
-        lines = done.stdout.splitlines()
+        names = "".join(json.dumps(str(file)) + "\n" for file in files).encode()
+        seconds = START + SECONDS * len(files)
+        done = limited_process.run(reader_process.__file__, ["whole"] if whole else [], names, MEMORY, seconds)
+        *lines, _ = done.output.decode().split("\n")  # Without a line that the end of the process has cut.
         if not lines:
-            raise ReaderError(f"recordings cannot be read: {' '.join(done.stderr.split()[-30:])}")
+            raise ReaderError(f"recordings cannot be read: {' '.join(done.errors.split()[-30:])}")
         yield from map(json.loads, lines[1:])
         files = files[len(lines) - 1 :]
         if files:
-            yield {"error": f"the process that read it ended with code {done.returncode}"}
+            yield {"error": f"the process that read it {done.ending}"}
             files = files[1:]
 
 

@@ -73,6 +73,7 @@ def first_split(result: dict[str, Any], **values: Any) -> None:
         ],
         ("config.json", lambda config: config.pop("code") and None, BUILD),
         ("config.json", lambda config: config.update(code=None), BUILD),
+        ("config.json", lambda config: config["settings"].update(rate=0.5), BUILD),
     ],
 )
 def test_a_json_file_with_wrong_values_is_named(
@@ -80,6 +81,12 @@ def test_a_json_file_with_wrong_values_is_named(
 ):
     changed(here / SEED / name, change)
     assert f"{SEED}/{name} is damaged (" in complaint(*command)
+
+
+def test_settings_that_the_method_does_not_know_are_one_line(here: Path, complaint: Callable[..., str]):
+    changed(here / SEED / "config.json", lambda config: config["settings"].update(preset="qumck"))
+    assert f"with the settings in {SEED}/config.json" in complaint(*BUILD)
+    assert not (here / "board").exists()
 
 
 @pytest.mark.parametrize("column", ["split", "score", "failure", "cause", "closing_lag"])

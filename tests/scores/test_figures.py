@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from dextron_bench.scores import comparison, figures
 
@@ -19,6 +20,21 @@ def test_equal_comparisons_give_equal_bytes(suffix: str, tmp_path: Path, monkeyp
         monkeypatch.setenv("SOURCE_DATE_EPOCH", str(86_400 * day))  # Matplotlib takes its date from here.
         figures.differences(comparison.compare(a, b), file)
     assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_a_picture_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def write_half(self: Figure, file: Path, **options: object) -> None:
+        file.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    picture = tmp_path / "picture.png"
+    picture.write_bytes(b"old")
+    monkeypatch.setattr(Figure, "savefig", write_half)
+    point = dict.fromkeys(("epoch", "loss", "accuracy", "test_loss", "test_accuracy"), 1.0)
+    with pytest.raises(OSError, match="No space left") as caught:
+        figures.success_curve([point], picture)
+    assert caught.value.filename == str(picture)
+    assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("picture.png", b"old")]
 
 
 def test_an_unknown_format_lists_the_known_ones(tmp_path: Path):

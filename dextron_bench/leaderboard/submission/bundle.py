@@ -5,6 +5,7 @@ A bundle may come from a stranger, so reading one checks names, kinds, sizes and
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import re
@@ -21,13 +22,14 @@ from typing import Any
 import jsonschema
 from jsonschema.exceptions import best_match
 
-from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage import atomic, hashing, limited_process
 from dextron_bench.storage.printable import first_hidden
 from dextron_bench.storage.run_folder import RunFolder
 
 FORMAT = 1
 MOST_SEEDS = 10
 MANIFEST = "bundle.json"
+JSON_PROCESS = "dextron_bench.leaderboard.submission.json_process"
 MEMBER = re.compile(
     r"bundle\.json|agent/[A-Za-z0-9][\w.+-]*\.(?:py|pt|onnx|safetensors)"
     r"|seed\d{1,6}/(?:config\.json|provenance\.json|result\.json|recordings\.json|episodes\.parquet"
@@ -35,9 +37,13 @@ MEMBER = re.compile(
     re.ASCII,
 )
 MEMBERS = 20_000  # The largest number of files.
+LARGEST_DIRECTORY = 4 * 2**20  # [bytes] of the list of files in a zip.
 LARGEST = 256 * 2**20  # [bytes] of one unpacked file.
-LARGEST_MANIFEST = 4 * 2**20  # [bytes].
+LARGEST_JSON = 4 * 2**20  # [bytes] of a JSON file.
+MEMORY, SECONDS = 2 * limited_process.GIBIBYTE, 30.0  # [bytes], [s] of the process that checks a JSON file.
 TOTAL = 8 * 2**30  # [bytes] of all unpacked files.
+END, END_SIZE, ZIP64 = b"PK\5\6", 22, b"PK\6\7"  # The record at the end of a zip file; before it, one of large files.
+LARGEST_COMMENT = 2**16  # [bytes] after the end record.
 CHUNK = 2**20  # [bytes] that are copied at once.
 MEMBER_DATE = (1980, 1, 1, 0, 0, 0)  # The same for every member, so that equal contents make equal bundles.
 
@@ -77,9 +83,10 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
     Writes nothing outside the folder. Checks names, sizes and hashes before it parses the content of any file.
     """
     try:
+        _check_directory(file)
         with zipfile.ZipFile(file) as archive:
             members = _members(file, archive)
-            manifest = _manifest(file, _content(file, archive, members.get(MANIFEST)))
+            manifest = parse(_content(file, archive, members.get(MANIFEST)), "bundle", file)
             _check_files(file, set(members) - {MANIFEST}, set(manifest["files"]))
             for name, sha256 in manifest["files"].items():
                 if _extract(file, archive, members[name], into / name) != sha256:
@@ -89,6 +96,18 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
             f"{file} is not a complete zip file ({error}); make the bundle again with `dextron-bench submit`"
         ) from error
     return manifest
+
+
+def parse(content: bytes, schema: str, file: Path) -> dict[str, Any]:
+    """The JSON value of a file of a stranger, after a separate process has checked it; raises BadBundle."""
+    if len(content) > LARGEST_JSON:
+        raise BadBundle(f"{file}: the {schema} is larger than {LARGEST_JSON / 2**20:g} MiB")
+    done = limited_process.run(JSON_PROCESS, [schema, str(file)], content, MEMORY, SECONDS)
+    if done.code == 1 and done.output:
+        raise BadBundle(ast.literal_eval(done.output.decode()))
+    if done.code != 0:
+        raise BadBundle(f"{file}: the {schema} cannot be checked (the process that read it {done.ending})")
+    return json.loads(content)
 
 
 def check(value: Any, schema: str, file: Path) -> None:
@@ -131,6 +150,18 @@ def _schema(name: str) -> jsonschema.Draft202012Validator:
     return jsonschema.Draft202012Validator(json.loads(text))
 
 
+def _check_directory(file: Path) -> None:
+    """Raises BadBundle if the list of members, which is read as a whole, is longer than in any bundle."""
+    with file.open("rb") as content:
+        content.seek(max(0, file.stat().st_size - END_SIZE - LARGEST_COMMENT - len(ZIP64) - 16))
+        tail = content.read()
+    last = len(tail) - END_SIZE  # Where `zipfile` looks first; then it takes the last record before a comment.
+    place = last if tail[last:].startswith(END) and tail.endswith(b"\0\0") else tail.rfind(END)
+    size = int.from_bytes(tail[place + 12 : place + 16], "little") if place >= 0 else 0
+    if size > LARGEST_DIRECTORY or tail[max(0, place - 20) :].startswith(ZIP64):
+        raise BadBundle(f"{file} lists more files than the {MEMBERS} that a bundle accepts")
+
+
 def _members(file: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     """The members by name; raises BadBundle for members that a bundle never holds."""
     members: dict[str, zipfile.ZipInfo] = {}
@@ -145,7 +176,7 @@ def _members(file: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]
             raise BadBundle(f"{file}: {info.filename} is a link or encrypted")
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise BadBundle(f"{file}: {info.filename} uses a compression method whose output size cannot be limited")
-        if info.file_size > (LARGEST_MANIFEST if info.filename == MANIFEST else LARGEST):
+        if info.file_size > (LARGEST_JSON if info.filename.endswith(".json") else LARGEST):
             raise BadBundle(f"{file}: {info.filename} is too large when unpacked ({info.file_size / 2**20:.0f} MiB)")
         members[info.filename] = info
     return members
@@ -163,21 +194,12 @@ def _check_files(file: Path, present: set[str], listed: set[str]) -> None:
         raise BadBundle(f"{file} holds {extra[0]}, which its manifest does not list")
 
 
-def _manifest(file: Path, content: bytes) -> dict[str, Any]:
-    try:
-        manifest = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise BadBundle(f"{file}: {MANIFEST} is not valid JSON ({error})") from error
-    check(manifest, "bundle", file)
-    return manifest
-
-
 def _content(file: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo | None) -> bytes:
     if info is None:
         raise BadBundle(f"{file} is not a bundle: it lacks {MANIFEST}; `dextron-bench submit` makes one")
     with archive.open(info) as member:
-        content = member.read(LARGEST_MANIFEST + 1)
-    if len(content) > LARGEST_MANIFEST:
+        content = member.read(LARGEST_JSON + 1)
+    if len(content) > LARGEST_JSON:
         raise BadBundle(f"{file}: {info.filename} unpacks to more bytes than it states")
     return content
 

@@ -66,7 +66,7 @@ def _is_same(recorded: Episode, replayed: Episode, tolerance: float) -> bool:
     if not tolerance or recorded.states.shape != replayed.states.shape:
         return False
     equal = [np.array_equal(getattr(recorded, name), getattr(replayed, name)) for name in ("actions", "rewards")]
-    distances = np.abs(recorded.states - replayed.states)[:, : len(model.half_closed())]
+    distances = np.abs(recorded.states - replayed.states)[:, : len(model.initial_qpos())]
     return all(equal) and bool((distances <= tolerance).all())
 
 

@@ -79,10 +79,11 @@ class SeedCheck:
         for file in (self._run.episodes, self._run.result, self._run.provenance):
             if not file.exists():
                 raise bundle.BadBundle(f"lacks {file.name}")
+            if file.suffix == ".json" and file.stat().st_size > bundle.LARGEST_JSON:
+                raise bundle.BadBundle(f"has a {file.name} of more than {bundle.LARGEST_JSON / 2**20:g} MiB")
         table = episode_tables.read(self._run.episodes, self._splits)
-        result = result_files.read_result(self._run.result)
-        bundle.check(result, "result", self._run.result)
-        return table, result
+        bundle.parse(self._run.result.read_bytes(), "result", self._run.result)
+        return table, result_files.read_result(self._run.result)
 
     def _claims(self) -> dict[str, Any]:
         """Method, source of reaches and seed, as the manifest has them."""

@@ -1,7 +1,8 @@
 """What the process of an agent written in Python may not do: import the simulator, read splits, write elsewhere.
 
-A hook on Python's audit events stops forbidden actions and names them. The hook is no protection against malicious
-code, because such code can disable it; the sandbox is (docs/leaderboard.md).
+A hook on Python's audit events stops forbidden actions that pass through Python's own functions, and names them. It is
+no protection against malicious code: such code can disable the hook, and calls that raise no audit event, as in
+compiled modules, pass it. The sandbox is the protection: in it, the files are not there at all (docs/agents.md).
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ import sys
 from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from dextron_bench.methods.isolation import sandbox
-from dextron_bench.world import model
 
 PUBLIC = {  # Modules of the benchmark that agents may import, and the modules that these import (docs/agents.md).
     *("dextron_bench", "dextron_bench.experts", "dextron_bench.experts.policies"),
@@ -25,7 +28,7 @@ PUBLIC = {  # Modules of the benchmark that agents may import, and the modules t
     *("dextron_bench.world", "dextron_bench.world.model", "dextron_bench.world.task"),
 }
 WORKER = ("dextron_bench.methods.isolation", "dextron_bench.methods.loading", "dextron_bench.methods.specs")
-SIMULATORS = ("mujoco", "dm_control")
+WORKER_FILES = ("worker", "guard", "policy_files", "protocol", "sandbox")  # In WORKER's first package.
 NETWORK = ("socket.connect", "socket.bind", "socket.send", "socket.getaddrinfo", "socket.gethostby")
 DATABASE = "sqlite3.connect"  # A database can attach any other file.
 PROCESSES = ("subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.fork", "os.kill", "pty.")
@@ -53,13 +56,51 @@ def install(readable: Sequence[Path], scratch: Path) -> None:
     python = {sys.prefix, sys.base_prefix, sys.exec_prefix, *(entry for entry in sys.path if "-packages" in entry)}
     system = (*DEVICES, "/usr", "/lib", "/lib64", "/etc")
     allowed = [os.path.realpath(path) for path in (*python, *system, package, package.parent / "baselines", *readable)]
-    secrets = [str(file) for file in sandbox.secret_files()]
+    secrets = [f"{package}/data/{start}" for start in sandbox.SECRET]
     sys.meta_path.insert(0, _HiddenModules())
     sys.addaudithook(_Guard(allowed, os.path.realpath(scratch), secrets))
 
 
+def public_files() -> list[Path]:
+    """The package's files that the process of an agent may read."""
+    package = Path(__file__).resolve().parents[2]
+    worker = (*WORKER, *(f"{WORKER[0]}.{name}" for name in WORKER_FILES), "dextron_bench.world.registration")
+    places = [package.parent.joinpath(*name.split(".")) for name in (*PUBLIC, *worker)]
+    modules = [place / "__init__.py" if place.is_dir() else place.with_suffix(".py") for place in places]
+    return sorted({*modules, *(package / "data").glob("success-*.safetensors")})
+
+
+def constants() -> dict[str, Any]:
+    """What pure functions of states need from the simulator's model, as JSON values; for `use_constants`."""
+    from dextron_bench.world import model
+
+    joints, closed = model.proximal()
+    arrays = {"joints": joints, "closed": closed, "gain": model.command_gain(), "half_closed": model.initial_qpos()}
+    return {**{name: array.tolist() for name, array in arrays.items()}, "state_names": model.state_names()}
+
+
+def use_constants(values: dict[str, Any]) -> None:
+    """Lets `world.model` work without the simulator, which the sandbox does not have."""
+    sys.modules["mujoco"] = ModuleType("mujoco")
+    from dextron_bench.world import model
+
+    arrays = {name: np.array(values[name]) for name in ("joints", "closed", "gain", "half_closed")}
+    for array in arrays.values():
+        array.flags.writeable = False
+    names = tuple(values["state_names"])
+    model.proximal = lambda: (arrays["joints"], arrays["closed"])  # type: ignore[assignment]
+    model.command_gain = lambda: arrays["gain"]  # type: ignore[assignment]
+    model.initial_qpos = lambda: arrays["half_closed"]  # type: ignore[assignment]
+    model.state_names = lambda: names  # type: ignore[assignment]
+
+
 def hide_simulator() -> None:
     """Removes the simulator from this process; caches the values that pure functions of states need from it."""
+<<<<<<< HEAD
+=======
+    from dextron_bench.world import model
+
+>>>>>>> main
     for cached in (model.proximal, model.command_gain, model.initial_qpos, model.state_names):
         cached()
     model.load = model.mujoco = None  # type: ignore[assignment]
@@ -76,7 +117,8 @@ def hide_simulator() -> None:
 
 def _is_hidden(module: str) -> bool:
     top = module.partition(".")[0]
-    return top in SIMULATORS or (top == "dextron_bench" and module not in PUBLIC and not module.startswith(WORKER))
+    is_own = top == "dextron_bench" and module not in PUBLIC and not module.startswith(WORKER)
+    return is_own or top in sandbox.SIMULATORS
 
 
 def _check_import(module: str) -> None:
@@ -96,7 +138,7 @@ class _Guard:
     """The audit hook; raises NotForAgents."""
 
     def __init__(self, allowed: Sequence[str], scratch: str, secrets: Sequence[str]) -> None:
-        self._allowed, self._scratch, self._secrets = tuple(allowed), scratch, frozenset(secrets)
+        self._allowed, self._scratch, self._secrets = tuple(allowed), scratch, tuple(secrets)
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
         if event == "import":
@@ -127,7 +169,7 @@ class _Guard:
         self._check_read(real)
 
     def _check_read(self, path: str) -> None:
-        if path in self._secrets:
+        if path.startswith(self._secrets):
             raise NotForAgents(f"read {path}: settings and experts are not for agents")
         if not any(_is_within(path, folder) for folder in (*self._allowed, self._scratch)):
             raise NotForAgents(f"read {path}: they may read only Python's files and their own folder")

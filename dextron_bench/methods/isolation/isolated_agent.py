@@ -16,15 +16,16 @@ from dextron_bench.methods.isolation.process import NoAnswer, Process
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of an agent's process: time [s] to start, for one answer, and for a whole split; memory [bytes]."""
+    """Limits of an agent's process: time [s] to start, for one answer, and for a whole split; memory, disk [bytes]."""
 
     start: float = 60.0
     answer: float = 10.0
     total: float = 3600.0
     memory: int = 4 * 2**30
+    disk: int = 512 * 2**20
 
     def __post_init__(self) -> None:
-        if not min(self.start, self.answer, self.total, self.memory) > 0:
+        if not min(self.start, self.answer, self.total, self.memory, self.disk) > 0:
             raise AgentError("an agent needs time and memory: --timeout and --memory are more than 0")
 
 
@@ -84,7 +85,8 @@ class IsolatedAgent:
         self.starts += 1
         try:
             command = self._launch.command_line(self._scratch.name, self._limits.memory)
-            process = self._process = Process(command, self._scratch.name, protocol.max_answer_size(episodes))
+            size, limits = protocol.max_answer_size(episodes), self._limits
+            process = self._process = Process(command, self._scratch.name, size, limits.memory, limits.disk)
         except (OSError, IndexError) as error:
             raise AgentError(f"the agent's process cannot be started: {error}") from error
         try:

@@ -12,7 +12,7 @@ from typing import Any
 
 from dextron_bench.methods import specs
 from dextron_bench.methods.agents import AgentError
-from dextron_bench.methods.isolation import sandbox
+from dextron_bench.methods.isolation import guard, sandbox
 from dextron_bench.methods.specs import AgentSpec
 
 
@@ -48,9 +48,13 @@ class Launch:
         """
         if not self.trusted and not sandbox.is_available():
             raise NoSandbox(self.spec)
-        request = json.dumps({**asdict(self), "scratch": scratch})
+        request = json.dumps({**asdict(self), "scratch": scratch, "constants": guard.constants()})
         worker = [sys.executable, "-P", "-m", "dextron_bench.methods.isolation.worker", request]
-        return sandbox.wrap(self.command or worker, scratch, self.readable, memory)
+        return sandbox.wrap(self.command or worker, scratch, self.readable, memory, self._public_files())
+
+    def _public_files(self) -> list[Path]:
+        """This package's files that the process may read; empty for all, since an installed method may import any."""
+        return [] if self.spec.kind == "method" else guard.public_files()
 
 
 def prepare_launch(

@@ -10,11 +10,14 @@ import tempfile
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import IO
+
+from dextron_bench.methods.isolation import usage
 
 ENVIRONMENT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT", "VIRTUAL_ENV")  # Variables that a process keeps.
 EXIT_TIMEOUT = 5.0  # [s] that a process may take to end after it has closed its output.
+PERIOD = 0.1  # [s] between two measurements of memory and disk.
+MOST_PROCESSES = 64
 STDERR_TAIL = 2000  # [bytes] at the end of stderr in which the last line is searched.
 
 
@@ -25,8 +28,12 @@ class NoAnswer(RuntimeError):
 class Process:
     """A process that answers lines with lines. Threads read and write, so that neither side blocks the benchmark."""
 
-    def __init__(self, command: Sequence[str], folder: str, max_answer: int) -> None:
-        """Starts the command in a folder; an answer may have `max_answer` bytes."""
+    def __init__(self, command: Sequence[str], folder: str, max_answer: int, memory: int = 0, disk: int = 0) -> None:
+        """Starts the command in a folder; an answer may have `max_answer` bytes.
+
+        It ends if it and its children use more than `memory` [bytes] together, or their folder more than `disk`
+        [bytes]; 0 sets no limit.
+        """
         environment = {name: os.environ[name] for name in ENVIRONMENT if name in os.environ}
         environment |= {"HOME": folder, "TMPDIR": folder, "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `kill`)
@@ -42,10 +49,15 @@ class Process:
         self._questions: queue.Queue[bytes | None] = queue.Queue()
         self._answers: queue.Queue[bytes] = queue.Queue(2)  # The expected answer, and one more to detect a surplus.
         self._max_answer, self._killed = max_answer, False
+        self._folder, self._memory, self._disk = folder, memory, disk
+        self._excess = ""  # What it used too much of.
+        self._ended = threading.Event()
         assert self._popen.stdin
         assert self._popen.stdout
         threading.Thread(target=self._write, args=(self._popen.stdin,), daemon=True).start()
         threading.Thread(target=self._read, args=(self._popen.stdout,), daemon=True).start()
+        if memory or disk:
+            threading.Thread(target=self._watch, daemon=True).start()
 
     def ask(self, question: bytes, seconds: float) -> bytes:
         """The line that answers a question; raises NoAnswer if the process ends or no line comes in time."""
@@ -64,6 +76,8 @@ class Process:
 
     def describe_failure(self, error: Exception) -> str:
         """The error, how the process ended if it did, and the last line that it wrote to stderr."""
+        if self._excess:
+            return self._excess
         if str(error) == "it ended":
             try:
                 code = self._popen.wait(EXIT_TIMEOUT)
@@ -77,24 +91,38 @@ class Process:
 
     def peak_memory(self) -> int:
         """The highest use of memory [bytes] of the process or a child, 0 if the system does not report it."""
-        try:
-            return max(map(_peak_memory, _process_tree(self._popen.pid)))
-        except (OSError, ValueError):
-            return 0
+        return max(map(usage.peak_memory, usage.process_tree(self._popen.pid)))
 
     def kill(self) -> None:
         """Ends the process and its children."""
         self._questions.put(None)
         self._killed = True
-        try:
-            os.killpg(self._popen.pid, signal.SIGKILL)
-        except (OSError, AttributeError):
-            self._popen.kill()
+        self._ended.set()
+        self._end()
         self._popen.wait()
         self._stderr.close()
         with suppress(queue.Empty):
             while True:  # The reader may wait for room in the queue; emptying the queue lets it end.
                 self._answers.get_nowait()
+
+    def _end(self) -> None:
+        try:
+            os.killpg(self._popen.pid, signal.SIGKILL)
+        except (OSError, AttributeError):
+            self._popen.kill()
+
+    def _watch(self) -> None:
+        """Ends the process when it uses too much."""
+        while not self._ended.wait(PERIOD) and not self._excess:
+            tree = usage.process_tree(self._popen.pid)
+            if self._memory and (used := usage.memory(tree)) > self._memory:
+                self._excess = f"it used {used / 2**20:.0f} MiB of memory, more than {self._memory / 2**20:.0f}"
+            elif self._disk and (used := usage.disk(self._folder)) > self._disk:
+                self._excess = f"it wrote {used / 2**20:.0f} MiB of files, more than {self._disk / 2**20:.0f}"
+            elif len(tree) > MOST_PROCESSES:
+                self._excess = f"it started {len(tree)} processes, more than {MOST_PROCESSES}"
+            if self._excess and not self._killed:
+                self._end()
 
     def _write(self, pipe: IO[bytes]) -> None:
         try:
@@ -120,15 +148,3 @@ def _describe_exit(code: int | None) -> str:
     number = -code if code is not None and code < 0 else code - 128 if code is not None and code > 128 else 0
     names = {one.value: one.name for one in signal.Signals}
     return f"signal {names[number]}" if number in names else f"code {code}"
-
-
-def _process_tree(process: int) -> list[int]:
-    """The ids of a process and of all processes that it started."""
-    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
-    return [process, *(number for child in children for number in _process_tree(int(child)))]
-
-
-def _peak_memory(process: int) -> int:
-    """The highest use of memory [bytes] of one process."""
-    lines = Path(f"/proc/{process}/status").read_text().splitlines()
-    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")), 0)

@@ -1,7 +1,8 @@
 """The command around an agent's process: limits on memory and files, and a sandbox if bubblewrap is installed.
 
 In the sandbox there is no network and no other process. The agent can write only in its own folder. It can read only
-programs, Python's files, its own files, and this package without the files of settings and experts.
+programs, Python's files, its own files, and the public modules of this package. The simulator, the splits and the
+experts are not there. An installed method may read all of this package's code, since the user has chosen to install it.
 """
 
 from __future__ import annotations
@@ -14,27 +15,51 @@ from functools import cache
 from pathlib import Path
 
 PROGRAMS = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc/ld.so.cache", "/etc/alternatives")
+SIMULATORS = ("mujoco", "dm_control")  # Packages that are hidden.
+SYSTEM_LIBRARIES = ("/usr/lib", "/usr/local/lib")  # Where other interpreters have packages.
 SECRET = ("splits", "experts", "real", "synthetic")  # The package's data files that begin so hold settings or experts.
 LARGEST_FILE = 256 * 2**20  # [bytes] of a file that an agent may write; its stderr is one such file.
-LIMITS = 'ulimit -c 0; ulimit -d "$1" && ulimit -f "$2" && shift 2 && exec "$@"'
+# The last two options exist since bubblewrap 0.8.
+NAMESPACES = (
+    "--unshare-all",
+    "--cap-drop",
+    "ALL",
+    "--unshare-user",
+    "--disable-userns",
+)  # The last two since bubblewrap 0.8.
+LIMITS = 'ulimit -c 0; ulimit -n 512; ulimit -d "$1" && ulimit -f "$2" && shift 2 && exec "$@"'
 
 
-def wrap(command: Sequence[str], scratch: str, readable: Sequence[str], memory: int) -> list[str]:
-    """The command with limits on memory and files [bytes], in a sandbox if one is available."""
+def wrap(
+    command: Sequence[str], scratch: str, readable: Sequence[str], memory: int, public: Sequence[Path] = ()
+) -> list[str]:
+    """The command with limits on memory and files [bytes], in a sandbox if one is available.
+
+    `public` are the files of this package that the sandbox has; without them it has the package, and the simulator too.
+    """
     limited = ["/bin/sh", "-c", LIMITS, "agent", str(memory // 1024), str(LARGEST_FILE // 512), *command]
     if not Path("/bin/sh").exists():
         return list(command)
-    return [*_bubblewrap(scratch, readable), *limited] if is_available() else limited
+    return [*_bubblewrap(scratch, readable, public), *limited] if is_available() else limited
 
 
 @cache
 def is_available() -> bool:
     """True if bubblewrap is installed and works on this system; runs it once."""
+    return bool(_namespaces())
+
+
+@cache
+def _namespaces() -> tuple[str, ...]:
+    """The strictest options for namespaces with which bubblewrap works on this system; empty if there are none."""
     if not shutil.which("bwrap"):
-        return False
-    mounts = ["--ro-bind", "/", "/", "--proc", "/proc", "--dev", "/dev"]
-    command = ["bwrap", "--unshare-all", *mounts, "/bin/sh", "-c", ":"]
-    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+        return ()
+    mounts = ["--ro-bind", "/", "/", "--proc", "/proc", "--dev", "/dev", "--remount-ro", "/dev"]
+    for options in (NAMESPACES, NAMESPACES[:3]):
+        command = ["bwrap", *options, *mounts, "/bin/sh", "-c", ":"]
+        if subprocess.run(command, capture_output=True, check=False).returncode == 0:
+            return options
+    return ()
 
 
 def secret_files() -> list[Path]:
@@ -43,15 +68,38 @@ def secret_files() -> list[Path]:
     return sorted(file for file in data.iterdir() if file.name.startswith(SECRET))
 
 
-def _bubblewrap(scratch: str, readable: Sequence[str]) -> list[str]:
+def _bubblewrap(scratch: str, readable: Sequence[str], public: Sequence[Path]) -> list[str]:
+    """Folders first, then what hides parts of them, then files; at last, all that is left becomes read-only."""
     package = Path(__file__).resolve().parents[2]
-    installed = {entry for entry in sys.path if "-packages" in entry and Path(entry).exists()}
-    code = (str(package), str(package.parent / "baselines"))
-    paths = [*PROGRAMS, sys.base_prefix, sys.prefix, *sorted(installed), *code]
-    command = ["bwrap", "--unshare-all", "--die-with-parent", "--new-session", "--proc", "/proc", "--dev", "/dev"]
+    code = (sys.base_prefix, sys.prefix, *map(str, _installed()), str(package.parent / "baselines"))
+    folders = [*PROGRAMS, *code]
+    folders += [path for path in readable if not Path(path).is_file()]
+    hidden = _hidden(package) if public else []
+    command = ["bwrap", *_namespaces(), "--die-with-parent", "--new-session", "--proc", "/proc", "--dev", "/dev"]
     command += ["--tmpfs", "/tmp"]
-    for path in [*paths, *readable]:
+    for path in folders if public else [*folders, str(package)]:
         command += ["--ro-bind-try", path, path]
-    for file in secret_files():
+    for folder in hidden:
+        command += ["--tmpfs", str(folder)]
+    for file in [*map(str, public), *(path for path in readable if Path(path).is_file())]:
+        command += ["--ro-bind-try", file, file]
+    for file in [] if public else secret_files():
         command += ["--ro-bind", "/dev/null", str(file)]
-    return [*command, "--bind", scratch, scratch, "--chdir", scratch, "--"]
+    command += ["--bind", scratch, scratch, "--chdir", scratch]
+    for folder in (*hidden, "/tmp", "/dev", "/"):
+        command += ["--remount-ro", str(folder)]
+    return [*command, "--"]
+
+
+def _installed() -> list[Path]:
+    """The folders of installed packages."""
+    return sorted({Path(entry) for entry in sys.path if "-packages" in entry and Path(entry).exists()})
+
+
+def _hidden(package: Path) -> list[Path]:
+    """The folders of this package and of the simulators, which the sandbox replaces by empty ones."""
+    names = (package.name, *SIMULATORS)
+    roots = [Path(sys.base_prefix, "lib"), *(Path(folder) for folder in SYSTEM_LIBRARIES)]
+    others = [entry for root in roots for entry in root.glob("python3*/*-packages")]
+    entries = dict.fromkeys([*_installed(), *others])
+    return [package, *(place for entry in entries for name in names if (place := entry / name).is_dir())]

@@ -27,6 +27,8 @@ def main(request: dict[str, Any]) -> None:
     questions = sys.stdin.buffer
     spec = AgentSpec(**request["spec"])
     installed = loading.load_class(spec) if spec.kind == "method" else None
+    if not installed:
+        guard.use_constants(request["constants"])
     guard.install([Path(path) for path in request["readable"]], Path(request["scratch"]))
     seed = json.loads(questions.readline())["seed"]
     agent = _create_agent(spec, installed, request["settings"], request["weights"], seed)

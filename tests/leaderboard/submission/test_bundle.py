@@ -162,3 +162,36 @@ def test_text_that_cannot_be_printed_and_many_seeds_are_refused(changes: dict[st
     with pytest.raises(bundle.BadBundle) as caught:
         bundle.check(value, "bundle", Path("mine.zip"))
     assert why in str(caught.value)
+
+
+def test_json_is_limited_before_it_is_parsed(unsafe: Unsafe, tmp_path: Path):
+    big = unsafe.add("seed7/result.json", b" " * (bundle.LARGEST_JSON + 1))
+    assert "seed7/result.json is too large" in big.refused(tmp_path / "opened")
+    with pytest.raises(bundle.BadBundle, match="is larger than 4 MiB"):
+        bundle.parse(b" " * (bundle.LARGEST_JSON + 1), "result", tmp_path / "result.json")
+
+
+@pytest.mark.parametrize("content", [b"[" * 100_000, b'{"seed": ' + b"9" * 5000 + b"}", b"\xff", b"{} {}", b"[NaN]"])
+def test_json_that_harms_its_reader_is_refused(content: bytes, tmp_path: Path):
+    with pytest.raises(bundle.BadBundle, match=r"mine\.json"):
+        bundle.parse(content, "bundle", Path("mine.json"))
+
+
+def test_a_check_of_json_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch):
+    """A million seeds: the schema looks at each of them."""
+    monkeypatch.setattr(bundle, "SECONDS", 3.0)
+    with pytest.raises(bundle.BadBundle, match="the process that read it took too long"):
+        bundle.parse(b'{"seeds": [' + b"0," * 1_900_000 + b"0]}", "bundle", Path("mine.json"))
+
+
+def test_a_long_list_of_files_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    file = tmp_path / "many.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        for number in range(2000):
+            archive.writestr(f"agent/{number}.py", b"")
+    content = file.read_bytes()
+    file.write_bytes(content[:-6] + b"PK\5\6" + content[-2:])  # A second mark, inside the record.
+    monkeypatch.setattr(bundle, "LARGEST_DIRECTORY", 100_000)
+    monkeypatch.setattr(zipfile, "ZipFile", None)
+    with pytest.raises(bundle.BadBundle, match="lists more files than the 20000"):
+        bundle.unpack(file, tmp_path / "opened")

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import resource
+
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from pandas.testing import assert_frame_equal
 
+from dextron_bench.leaderboard.submission import episode_tables, table_process
+from dextron_bench.leaderboard.submission.bundle import BadBundle
+from dextron_bench.splits.loading import load_split, ranking_splits
+from tests.helpers import tiny_benchmark
 from tests.helpers.forged_bundles import Forgery, row
 
 
@@ -53,3 +60,41 @@ def test_a_file_that_is_not_a_table_is_refused(forged: Forgery):
 def test_a_long_text_is_refused(forged: Forgery):
     forged.table(row(2, failure="x" * 5000))
     assert "has texts of more than 1000 characters in column 'failure'" in forged.checked().problems[0]
+
+
+def test_a_footer_with_a_false_count_fills_no_memory(forged: Forgery, monkeypatch: pytest.MonkeyPatch):
+    """A reader that asks for 3 GB ends; the footer of a real table makes it do so with a few bytes."""
+    script = forged.seed / "hungry.py"
+    script.write_text("b'x' * (3 << 30)")
+    monkeypatch.setattr(table_process, "__file__", str(script))
+    with pytest.raises(BadBundle, match="cannot be read as a table"):
+        episode_tables.read(forged.seed / "episodes.parquet", [])
+
+
+def test_a_table_that_takes_too_long_is_refused(forged: Forgery, monkeypatch: pytest.MonkeyPatch):
+    script = forged.seed / "slow.py"
+    script.write_text("while True: pass")
+    monkeypatch.setattr(table_process, "__file__", str(script))
+    monkeypatch.setattr(episode_tables, "SECONDS", 0.5)
+    with pytest.raises(BadBundle, match="the process that read it took too long"):
+        episode_tables.read(forged.seed / "episodes.parquet", [])
+
+
+def test_a_table_with_a_changed_footer_is_refused_or_equal(forged: Forgery):
+    """The memory of the reader stays below its limit, whatever count the bytes state."""
+    file = forged.seed / "episodes.parquet"
+    content = file.read_bytes()
+    length = int.from_bytes(content[-8:-4], "little")
+    splits = [load_split(tiny_benchmark.NAME, name) for name in ranking_splits(tiny_benchmark.NAME)]
+    whole, refused = episode_tables.read(file, splits), 0
+    for place in range(12):
+        changed = bytearray(content)
+        spot = len(content) - 8 - length + place * length // 12
+        changed[spot : spot + 5] = b"\xfe\xff\xff\xff\x0f"  # A large number as Thrift writes it.
+        file.write_bytes(changed)
+        try:
+            assert_frame_equal(episode_tables.read(file, splits), whole)
+        except BadBundle:
+            refused += 1
+    assert refused >= 6
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 1_500_000  # [kB]

@@ -12,7 +12,10 @@ import pytest
 from dextron_bench.methods.isolation import sandbox
 from tests.helpers.forged_bundles import Forgery, row
 
+needs_sandbox = pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
 
+
+@needs_sandbox
 def test_a_valid_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forged: Forgery):
     """One of the four episodes of each seed knocks the bottle over."""
     verdict = forged.checked(rerun=True)
@@ -98,6 +101,7 @@ def test_a_tier_cannot_be_claimed(forged: Forgery):
     assert "tier" not in verdict.results[0]
 
 
+@needs_sandbox
 def test_another_agents_episodes_are_refused_unless_the_agent_chooses_them(submitted: Path, forged: Forgery):
     """The board has the same episodes under another name."""
     other = json.loads((submitted / "runs/submissions/near/synthetic/seed0/result.json").read_text()) | {

@@ -45,6 +45,7 @@ class Agent:
     def act(self, states):
         {act}
 """
+MEMORY = "MiB of memory, more than 768"
 CLOSES = "return np.where(task.distance(states) < 0.06, 1.0, -1.0)[:, None]"
 
 
@@ -283,8 +284,8 @@ class Writer(torch.nn.Module):
         self.path = path
 
     def forward(self, states: torch.Tensor) -> torch.Tensor:
-        torch.from_file(self.path, True, 10).fill_(1.0)
-        return states[:, :1] * 0.0
+        stolen = torch.from_file(self.path, True, 10).fill_(1.0)
+        return states[:, :1] * 0.0 + stolen[0] * 0.0
 
 
 @pytest.fixture
@@ -295,9 +296,63 @@ def writer(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.parametrize(
+    ("act", "why"),
+    [
+        (
+            "import mmap; self.m = [mmap.mmap(-1, 2**27) for _ in range(8)]; [m.write(b'x' * 2**27) for m in self.m]",
+            MEMORY,
+        ),
+        (
+            "import os; self.f = [os.memfd_create('m') for _ in range(8)]; [os.write(f, b'x' * 2**27) for f in self.f]",
+            MEMORY,
+        ),
+        ("[open(str(k), 'wb').write(b'x' * 2**25) for k in range(16)]", "MiB of files, more than 256"),
+    ],
+)
+def test_memory_that_is_shared_and_files_end_the_agent(act: str, why: str, agent_spec: Callable[[str], str]):
+    limits = {"answer": 30.0, "memory": 768 * 2**20, "disk": 256 * 2**20}
+    (episode,) = play(agent_spec(f"{act}; import time; time.sleep(20)"), CASES[:1], **limits)
+    assert why in episode.failure
+
+
+@pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
+def test_the_sandbox_has_no_simulator_no_splits_and_no_folder_to_write_in(
+    agent_spec: Callable[[str], str], tmp_path: Path
+):
+    """The agent walks all files that it can see from a child process, which no hook watches, and reports them."""
+    probe = """
+import importlib.util, os, sys
+seen = [os.path.join(f, n) for top in sys.path + ["/tmp", {package!r}] for f, _, ns in os.walk(top) for n in ns]
+bad = [n for n in seen if n.endswith((".parquet", "engine.py", "hand.xml", "splits.json")) and "pyarrow" not in n
+       and "dextron" in n or "packages/mujoco/" in n or "libmujoco" in n or "packages/dm_control/" in n]
+for place in ["/", "/tmp", "/dev/shm", {package!r}, "/usr", "/var"]:
+    try:
+        open(os.path.join(place, "written"), "w").close()
+        bad.append("wrote in " + place)
+    except OSError:
+        pass
+spec = importlib.util.find_spec("mujoco")
+print(len(seen) > 1000, bad[:3], spec and spec.origin)
+print([line.split()[1] for line in open("/proc/self/status") if line.startswith("CapEff")])
+""".format(package=str(Path(sandbox.__file__).parents[2]))
+    act = f"""
+        from multiprocessing.util import spawnv_passfds
+        import os, sys
+        from dextron_bench.methods.isolation import guard
+        guard._Guard.__call__ = lambda *_: None
+        open("probe.py", "w").write({probe!r})
+        import subprocess
+        done = subprocess.run([sys.executable, "probe.py"], capture_output=True, text=True)
+        raise ValueError(" ".join(done.stdout.split()) + done.stderr.strip()[-200:])"""
+    (episode,) = play(agent_spec(act.strip()), CASES[:1])
+    assert "ValueError: True [] None ['0000000000000000']" in episode.failure
+
+
 @pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
 def test_torchscript_that_writes_files_writes_none_in_the_sandbox(writer: Path):
-    play(str(writer), CASES[:1])
+    (episode,) = play(str(writer), CASES[:1])
+    assert "unable to open file" in episode.failure
     assert not writer.with_name("stolen").exists()
 
 
