@@ -62,24 +62,11 @@ def command_gain() -> np.ndarray:
 
 @cache
 def initial_qpos() -> np.ndarray:
-<<<<<<< HEAD
     """Joint positions (25,) at the start of an episode, without the palm's pose, which the caller sets.
 
     Only the proximal joints are set, to half of their range; the couplings then pull each digit open by about a third.
     """
     return _read_only(load().key("start").qpos.copy())
-=======
-    """Joint positions (25,) at the start of an episode, without the palm's pose, which the caller sets."""
-    model = load()
-    qpos = model.qpos0.copy()
-    for digit in DIGITS:
-        close = proximal()[1][DIGITS.index(digit)] * HALF_CLOSED
-        coupling = model.equality(digit).data[1]
-        qpos[model.joint(f"{digit}_proximal").qposadr] = close
-        qpos[model.joint(f"{digit}_distal").qposadr] = close * coupling
-    qpos[model.joint("thumb_base").qposadr] = THUMB_OPPOSED
-    return _read_only(qpos)
->>>>>>> main
 
 
 @cache

@@ -38,21 +38,6 @@ def play(trajectory: np.ndarray, poses: int = 10_000) -> tuple[list[float], int,
     return rewards, 0, False, False
 
 
-<<<<<<< HEAD
-=======
-def test_every_digit_starts_half_closed_with_the_thumb_opposed():
-    angles = {
-        "thumb_base": 1.05,
-        "thumb_proximal": -0.285,
-        "thumb_distal": -0.2565,  # Coupled 0.9 to 1.
-        **{f"{finger}_{part}": 0.785 for finger in model.DIGITS[1:] for part in ("proximal", "distal")},
-    }
-    qpos = model.initial_qpos()
-    measured = {name: float(qpos[model.load().joint(name).qposadr[0]]) for name in angles}
-    assert measured == pytest.approx(angles)
-
-
->>>>>>> main
 def test_the_palm_centre_rotates_with_the_palm():
     rows = states(2)
     rows[:, 7:10] = 1.0, 2.0, 3.0

@@ -96,11 +96,8 @@ def use_constants(values: dict[str, Any]) -> None:
 
 def hide_simulator() -> None:
     """Removes the simulator from this process; caches the values that pure functions of states need from it."""
-<<<<<<< HEAD
-=======
     from dextron_bench.world import model
 
->>>>>>> main
     for cached in (model.proximal, model.command_gain, model.initial_qpos, model.state_names):
         cached()
     model.load = model.mujoco = None  # type: ignore[assignment]
