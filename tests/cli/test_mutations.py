@@ -159,6 +159,7 @@ def test_a_mutation_is_named_or_changes_nothing(
     rng = random.Random(f"{state} {name}")
     signal.signal(signal.SIGALRM, timed_out)
     original, codes = (folders[state] / name).read_bytes(), []
+    expected: dict[str, Any] = {}
     for number in range(COUNT + 1):
         folder = tmp_path / str(number)
         shutil.copytree(folders[state], folder)

@@ -54,7 +54,7 @@ def test_an_offset_that_is_not_finite_or_off_the_table_is_refused(place: int, va
     offsets = [0.0, 0.0]
     offsets[place] = value
     with pytest.raises(SettingError, match=rf"offset_{'xy'[place]} of a setting .*; got {value}"):
-        Setting("a", *offsets, 0.0)
+        Setting("a", offsets[0], offsets[1], 0.0)
 
 
 def test_a_table_with_a_number_that_is_missing_is_refused():

@@ -30,7 +30,7 @@ def test_a_picture_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: p
     picture = tmp_path / "picture.png"
     picture.write_bytes(b"old")
     monkeypatch.setattr(Figure, "savefig", write_half)
-    point = dict.fromkeys(("epoch", "loss", "accuracy", "test_loss", "test_accuracy"), 1.0)
+    point: dict[str, float] = dict.fromkeys(("epoch", "loss", "accuracy", "test_loss", "test_accuracy"), 1.0)
     with pytest.raises(OSError, match="No space left") as caught:
         figures.success_curve([point], picture)
     assert caught.value.filename == str(picture)

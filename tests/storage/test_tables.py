@@ -42,7 +42,7 @@ def test_lists_and_missing_values_are_part_of_the_digest(tmp_path: Path):
     table = pd.DataFrame({"actions": [np.array([0.1, 0.2]), np.array([])], "lag": [None, 0.5], "none": [None, None]})
     tables.write(tmp_path / "a", table)
     assert tables.digest(tables.read(tmp_path / "a", {})) == tables.digest(table)
-    assert tables.digest(table.assign(actions=[np.array([0.1]), np.array([0.2])])) != tables.digest(table)
+    assert tables.digest(table.assign(actions=pd.Series([np.array([0.1]), np.array([0.2])]))) != tables.digest(table)
 
 
 @pytest.mark.parametrize("name", list(TABLE))

@@ -41,6 +41,18 @@ def test_a_machine_has_the_same_platform_as_itself(monkeypatch: pytest.MonkeyPat
     assert not result_check.same_platform(here)
 
 
+def test_other_vector_extensions_make_another_platform():
+    """A provenance that does not have them counts as before; nothing is excused for a machine that is no object."""
+    here = provenance.collect("")
+    here["machine"]["vector_extensions"] = ["sse4_2"]
+    assert not result_check.same_platform(here)
+    here["machine"]["vector_extensions"] = None
+    assert result_check.same_platform(here)
+    del here["machine"]["vector_extensions"]
+    assert result_check.same_platform(here)
+    assert result_check.same_platform({**here, "machine": []})
+
+
 def test_on_another_platform_only_outcomes_must_agree(forged: Forgery):
     """All episodes differ in the last bits; their outcomes equal the replay."""
     forged.json("seed0/provenance.json", lambda content: content["machine"].update(cpu="another"))
