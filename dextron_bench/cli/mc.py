@@ -50,6 +50,7 @@ class MonteCarlo:
         engine = Engine(montecarlo.SLOTS, self.threads)
         if self.extend:
             rows, summary = database.load_shipped(self.reaches)
+            database.check_physics(summary)
             montecarlo.restore(source, search, folder, rows, summary["settings"] // search.block)
         with progress_bar("rows of return 20", self.quiet) as progress:
             draws = montecarlo.run(

@@ -20,6 +20,10 @@ from dextron_bench.world import model, task
 BANDS = 9  # Equal bands of d_c in the statistics.
 
 
+class OtherPhysics(ValueError):
+    """A database that was searched with other physics: a search finds other outcomes now."""
+
+
 class DamagedDatabase(ValueError):
     """A database that cannot be read, or whose rows differ from its summary."""
 
@@ -69,6 +73,16 @@ def summary(file: Path) -> dict[str, Any]:
     if not isinstance(about, dict) or not {"digest", "search", "statistics"} <= set(about):
         raise DamagedDatabase(f"summary of expert database {file} is incomplete; make it again with `mc`")
     return about
+
+
+def check_physics(summary: dict[str, Any]) -> None:
+    """Raises OtherPhysics if the search of a summary was played with other physics than this version's."""
+    physics = provenance.physics_of(summary)
+    if physics != model.mjcf_hash():
+        raise OtherPhysics(
+            f"the database was searched with physics {physics[:8] or 'unknown'}, and this version has "
+            f"{model.mjcf_hash()[:8]}; search again without --extend"
+        )
 
 
 def load_shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:

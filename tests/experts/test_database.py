@@ -132,3 +132,11 @@ def test_the_shipped_databases_can_be_loaded(reaches: str):
     assert (rows["score"] > 1.0).all()
     assert rows["gain"].between(1.0, 1.5).all()
     assert rows["critical"].between(0.01, 0.9).all()
+
+
+def test_a_search_extends_only_a_database_of_the_same_physics(monkeypatch: pytest.MonkeyPatch):
+    summary = database.load_shipped("synthetic")[1]
+    database.check_physics(summary)
+    monkeypatch.setattr(database.model, "mjcf_hash", lambda: "f" * 64)
+    with pytest.raises(database.OtherPhysics, match="this version has ffffffff; search again without --extend"):
+        database.check_physics(summary)
