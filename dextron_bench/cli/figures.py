@@ -52,11 +52,11 @@ class Figures:
         from dextron_bench.experts import database
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.scores import figures
-        from dextron_bench.splits import building
+        from dextron_bench.splits.near_equal import SETTING
 
         source = open_source(self.reaches)
         solved = database.load_shipped(self.reaches)[0].query("score == 20")
-        solved = solved.drop_duplicates(building.SETTING).head(self.rows)
+        solved = solved.drop_duplicates(SETTING).head(self.rows)
         figures.start_points(source, solved, self._file("fig3a"))
         yield self._file("fig3a")
         figures.reach_paths(source, self._file("fig3b"))

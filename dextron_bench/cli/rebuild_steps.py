@@ -39,7 +39,10 @@ def _splits(reaches: str) -> Step:
     command, needs = f"splits --reaches {reaches} --into {DATA}", ()
     if reaches != "minjerk":
         database = f"{DATA}/experts-{reaches}.parquet"
-        command, needs = f"{command} --database {database}", (database, f"{DATA}/experts-{reaches}.json")
+        command, needs = (
+            f"{command} --database {database} --runs {{runs}}",
+            (database, f"{DATA}/experts-{reaches}.json"),
+        )
     return Step(f"splits-{reaches}", (command,), needs, (f"{DATA}/splits-{reaches}.parquet",))
 
 

@@ -30,6 +30,8 @@ class Splits:
     """The folder for splits.json and splits-<reaches>.parquet; entries of other sources are kept."""
     database: Path | None = None
     """The expert database that `dextron-bench mc` wrote; not needed for `minjerk`, which has one expert."""
+    runs: Path = Path("runs")
+    """Folder of all runs; also holds the scans, so that the same command continues after an interruption."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor."""
 
@@ -44,6 +46,7 @@ class Splits:
         from dextron_bench.experts import montecarlo
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.splits import building, building_minjerk
+        from dextron_bench.splits.scanning import Scanner
         from dextron_bench.world.engine import Engine
 
         engine = Engine(montecarlo.SLOTS, self.threads)
@@ -52,4 +55,7 @@ class Splits:
         if self.database is None:
             raise NeedsDatabase(f"splits of {self.reaches} reaches need --database, which `dextron-bench mc` writes")
         rows, summary = experts_database.load(self.database), experts_database.summary(self.database)
-        return building.build(open_source(self.reaches), rows, summary, self.into, engine)
+        scanner = Scanner(open_source(self.reaches), engine, self.runs / "splits" / self.reaches)
+        entry, distance = building.build(scanner, rows, summary, self.into)
+        print(f"best distance of the rule of thumb on val: {distance:g} m")
+        return entry

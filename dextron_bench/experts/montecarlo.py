@@ -7,6 +7,7 @@ continue, on any number of threads, and finds the same rows.
 from __future__ import annotations
 
 import itertools
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -110,8 +111,12 @@ def run(
     """
     blocks.write_or_check(asdict(search), folder)
     done = blocks.update_tallies(folder, {})
+    stored = frozenset(done)
     progress(blocks.total(done).solved, rows)
-    new_blocks = _play(source, search, engine, done, share or Share())
+    share = share or Share()
+    missing = (number for number in itertools.count(share.index, share.of) if number not in stored)
+    drawn = ((number, draw(source, search, number)) for number in missing)
+    new_blocks = play_blocks(source, engine, drawn, search.experts)
     while (last := blocks.last_block_needed(done, rows)) is None:
         blocks.write(folder, *next(new_blocks))
         done = blocks.update_tallies(folder, done)
@@ -151,36 +156,54 @@ def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataF
         )
 
 
-def _play(
-    source: setting.Source, search: Search, engine: Engine, done: Iterable[int], share: Share
+def play_blocks(
+    source: setting.Source, engine: Engine, drawn: Iterable[tuple[int, pd.DataFrame]], experts: int
 ) -> Iterator[tuple[int, pd.DataFrame]]:
-    """Yields each block that is not in `done` when it is complete, without end; the engine's slots stay busy."""
-    skip = frozenset(done)
-    started: list[_Block] = []
+    """Plays numbered blocks of draws; yields each with its outcomes, in their order, while the next are under way.
+
+    Each `experts` consecutive draws share setting and gain. The outcomes are the columns `score` (sum of rewards) and
+    `length` [control steps].
+    """
+    unfinished: deque[_Block] = deque()
+    started: dict[int, tuple[_Block, int]] = {}  # By number of the batch: its block, and its first row in it.
+    numbers = itertools.count()
 
     def all_batches() -> Iterator[branching.ExpertBatch]:
-        for block in (number for number in itertools.count(share.index, share.of) if number not in skip):
-            draws = draw(source, search, block)
-            started.append(_Block(block, draws, np.zeros(len(draws)), np.zeros(len(draws), int), search.block))
-            yield from batches(source, draws, search.experts)
+        for number, draws in drawn:
+            block = _Block(number, draws, np.zeros(len(draws)), np.zeros(len(draws), int), len(draws) // experts)
+            unfinished.append(block)
+            for k, batch in enumerate(batches(source, draws, experts)):
+                started[next(numbers)] = block, k * experts
+                yield batch
 
     for number, outcomes in branching.play(engine, all_batches()):
-        current = started[number // search.block]
-        first = number % search.block * search.experts
-        rows = slice(first, first + search.experts)
-        current.scores[rows], current.lengths[rows] = outcomes.returns, outcomes.lengths
-        current.unfinished -= 1
-        if not current.unfinished:
-            yield current.number, current.draws.assign(score=current.scores, length=current.lengths)
-            del current.draws
+        block, first = started.pop(number)
+        rows = slice(first, first + experts)
+        block.scores[rows], block.lengths[rows] = outcomes.returns, outcomes.lengths
+        block.left -= 1
+        while unfinished and not unfinished[0].left:
+            block = unfinished.popleft()
+            yield block.number, block.draws.assign(score=block.scores, length=block.lengths)
+
+
+@dataclass(frozen=True, slots=True)
+class OfReaches:
+    """A source's distribution of settings, on some of its reaches only."""
+
+    source: setting.Source
+    reaches: frozenset[str]
+
+    def sample(self, rng: np.random.Generator) -> setting.Setting:
+        """Draws settings until one is on these reaches."""
+        return next(one for one in map(self.source.sample, itertools.repeat(rng)) if one.reach in self.reaches)
 
 
 @dataclass(slots=True)
 class _Block:
-    """A block that is being played; `unfinished` settings have no outcomes yet."""
+    """A block that is being played; `left` settings have no outcomes yet."""
 
     number: int
     draws: pd.DataFrame
     scores: np.ndarray
     lengths: np.ndarray
-    unfinished: int
+    left: int

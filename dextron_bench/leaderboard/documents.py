@@ -30,7 +30,7 @@ from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.reaches.sources import RankedSource
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
-from dextron_bench.splits import building
+from dextron_bench.splits import hard
 from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import atomic
 from dextron_bench.world import model
@@ -90,7 +90,7 @@ def _values(board: Path) -> Callable[[str], str]:
                 return f"{len(load_split(reaches, name).cases):,}"
             case ["split", reaches, name, "narrow"]:
                 cases = load_split(reaches, name).cases
-                return f"{100 * sum(case.window <= building.HARD_WINDOW for case in cases) / len(cases):.1f}"
+                return f"{100 * sum(case.window <= hard.WINDOW for case in cases) / len(cases):.1f}"
             case [method, reaches, split, name]:
                 return _of_row(rows(), method, reaches, split, name)
         raise KeyError(key)

@@ -19,6 +19,7 @@ from dextron_bench.experts.policies import Expert
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import REACHES, MinjerkSource
 from dextron_bench.splits import building
+from dextron_bench.splits.scanning import Scanner
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
 
@@ -44,7 +45,8 @@ def build(folder: Path, engine: Engine, seed: int = 0, sizes: Sizes | None = Non
     sizes = sizes or Sizes()
     source = MinjerkSource()
     parts = draw(source, engine, seed, sizes)
-    tables = [building.scan_split(source, name, rows, engine, sizes.scan) for name, rows in parts.items()]
+    scanner = Scanner(source, engine)
+    tables = [building.scan_split(scanner, name, rows, sizes.scan) for name, rows in parts.items()]
     return building.write(source.name, pd.concat(tables, ignore_index=True), folder)
 
 

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import branching, montecarlo
+from dextron_bench.experts import montecarlo
 from dextron_bench.reaches import setting
-from dextron_bench.splits import building
 from dextron_bench.splits.loading import Split, cases_from_frame, split_digest
+from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.storage import hashing
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import task
@@ -55,28 +54,13 @@ def draw(
     return Split(split.name, split.reaches, tuple(cases_from_frame(fresh)), split_digest(fresh))
 
 
-@dataclass(frozen=True, slots=True)
-class _OfReaches:
-    """A source's distribution of settings, on some of its reaches only."""
-
-    source: setting.Source
-    reaches: frozenset[str]
-
-    def sample(self, rng: np.random.Generator) -> setting.Setting:
-        """Draws settings until one is on these reaches."""
-        return next(one for one in map(self.source.sample, itertools.repeat(rng)) if one.reach in self.reaches)
-
-
 def _solved_blocks(
     source: setting.Source, reaches: frozenset[str], seed: int, engine: Engine
 ) -> Iterator[pd.DataFrame]:
     """The solved settings of one block of draws after the other, without end: a row for each setting."""
     search = montecarlo.Search(source.name, seed, block=BLOCK)
-    for number in itertools.count():
-        draws = montecarlo.draw(_OfReaches(source, reaches), search, number)
-        scores = np.zeros((search.block, search.experts))
-        for place, outcomes in branching.play(engine, montecarlo.batches(source, draws, search.experts)):
-            scores[place] = outcomes.returns
-        solved = draws[scores.ravel() == task.SUCCESS]
+    drawn = ((k, montecarlo.draw(montecarlo.OfReaches(source, reaches), search, k)) for k in itertools.count())
+    for number, draws in montecarlo.play_blocks(source, engine, drawn, search.experts):
+        solved = draws[draws["score"] == task.SUCCESS]
         shuffled = solved.sample(frac=1.0, random_state=np.random.default_rng([seed, number, 4]))
-        yield shuffled.drop_duplicates(building.SETTING).sort_index()
+        yield shuffled.drop_duplicates(SETTING).sort_index()

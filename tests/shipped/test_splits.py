@@ -13,8 +13,7 @@ from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.setting import OFFSET, Source
 from dextron_bench.reaches.sources import open_source
-from dextron_bench.splits import building, building_minjerk
-from dextron_bench.splits.building import SETTING
+from dextron_bench.splits import building_minjerk
 from dextron_bench.splits.loading import (
     Split,
     all_splits,
@@ -22,6 +21,7 @@ from dextron_bench.splits.loading import (
     load_split,
     ranking_splits,
 )
+from dextron_bench.splits.near_equal import SETTING, without_near_equal
 from tests.helpers import tiny_benchmark
 
 SHIPPED = all_splits()
@@ -84,13 +84,11 @@ def test_no_setting_is_near_equal_to_a_setting_of_another_split(shipped: dict, r
     train = settings(shipped[reaches, "train"])
     for name in known_splits(reaches):
         if name != "train":
-            remaining = building.without_near_equal(train, settings(shipped[reaches, name]))
+            remaining = without_near_equal(train, settings(shipped[reaches, name]))
             assert len(remaining) == len(train), f"{name} is near train"
     for name in ranking_splits(reaches):
         val = settings(shipped[reaches, "val"])
-        assert len(building.without_near_equal(val, settings(shipped[reaches, name]))) == len(val), (
-            f"{name} is near val"
-        )
+        assert len(without_near_equal(val, settings(shipped[reaches, name]))) == len(val), f"{name} is near val"
 
 
 @each_source

@@ -12,10 +12,10 @@ from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import MinjerkSource
-from dextron_bench.reaches.reach import Path
 from dextron_bench.splits import building, building_minjerk
 from dextron_bench.splits.building import Sizes, TooFewRows
 from dextron_bench.splits.loading import cases_from_frame, split_digest
+from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.world.engine import Engine
 
 SIZES = Sizes(evaluated=20, val=10, open=5, reaches=0.25)
@@ -72,7 +72,7 @@ def test_no_split_shares_settings_reaches_or_subjects_that_it_must_not(parts):
     assert not subjects(parts["unseen-subject"]) & subjects(others)
     seen = pd.concat([parts["train"], parts["val"], parts["test"]])
     assert not set(parts["unseen-reach"]["reach"]) & set(seen["reach"])
-    settings = [set(rows[building.SETTING].itertuples(index=False, name=None)) for rows in parts.values()]
+    settings = [set(rows[SETTING].itertuples(index=False, name=None)) for rows in parts.values()]
     assert sum(map(len, settings)) == len(set.union(*settings))
 
 
@@ -84,31 +84,9 @@ def test_one_unseen_subject_is_from_the_hardest_third_and_one_from_the_middle():
     assert all(len(pair & {"q", "u", "s"}) == 1 and len(pair & {"w", "p", "x"}) == 1 for pair in drawn)
 
 
-def test_hard_takes_narrow_windows_and_at_most_half_of_them_from_the_rule(database, parts, monkeypatch):
-    """Windows go by row number: every third candidate is narrow, and the rule solves every narrow one but the fifth."""
-    train = parts["train"].assign(score=20.0).groupby(building.SETTING).head(1)
-    sizes = Sizes(evaluated=10, val=10, open=5, reaches=0.25, scan=64)
-    number = {name: k for k, name in enumerate(train.index)}
-    narrow = [k % 3 == 0 for k in number.values()]
-    scores = np.where(np.arange(64) < np.where(narrow, 5, 6)[:, None], 20.0, 0.0)  # 5 / 64 x 0.89 is 0.070, 6: 0.083.
-    monkeypatch.setattr(building, "scan", lambda source, rows, engine, points: scores)
-    monkeypatch.setattr(building, "solved_by_rule", lambda source, rows, engine: np.arange(len(rows)) % 5 != 4)
-    hard, rest = building.draw_hard(Strata(), train, Engine(1, 1), sizes)
-    taken = [number[name] for name in hard.index]
-    assert taken == [0, 3, 6, 9, 12, 15, 27, 42, 57, 72]  # Five by the rule, then every fifth of the narrow rows.
-    np.testing.assert_allclose(hard["window"], 0.89 * 5 / 64)
-    assert set(rest.index) == set(train.index) - set(hard.index)
-
-
-def test_the_rule_closes_at_its_distance_whatever_the_reach():
-    """The palm's centre is 0.105 m ahead of the carrier: 0.4 - 0.105 = 0.295 m from the bottle's axis."""
-    path = Path(np.array([[0.0, -0.4, 0.1]]), np.array([[1.0, 0.0, 0.0, 0.0]]))
-    assert building.first_distance(path) == pytest.approx(0.295)
-
-
 def test_train_keeps_every_expert_of_a_setting_and_other_splits_keep_one(parts):
-    assert (parts["train"].groupby(building.SETTING).size() == 2).all()
-    assert (parts["test"].groupby(building.SETTING).size() == 1).all()
+    assert (parts["train"].groupby(SETTING).size() == 2).all()
+    assert (parts["test"].groupby(SETTING).size() == 1).all()
 
 
 def test_equal_seeds_give_equal_splits(database, parts):
@@ -120,37 +98,6 @@ def test_equal_seeds_give_equal_splits(database, parts):
 def test_a_database_that_is_too_small_raises(database):
     with pytest.raises(TooFewRows, match="needs 20 solved settings"):
         building.partition(Strata(), database.head(60), 0, SIZES, None)
-
-
-def test_near_equal_settings_are_dropped():
-    held_out = pd.DataFrame([["a", 0.01, 0.02, 0.5]], columns=building.SETTING)
-    rows = pd.DataFrame(
-        [
-            ["a", 0.0105, 0.0205, 0.51],  # Near-equal in all three numbers.
-            ["a", 0.0115, 0.02, 0.5],  # 1.5 mm apart.
-            ["a", 0.01, 0.02, 0.53],  # Another duration.
-            ["b", 0.01, 0.02, 0.5],  # Another reach.
-        ],
-        columns=building.SETTING,
-    )
-    assert building.without_near_equal(rows, held_out).index.tolist() == [1, 2, 3]
-
-
-def test_window_and_best_critical_distance_of_a_scan():
-    scores = np.array([[0, 20, 20, 20, 0, 20, 0, 0], [0, 0, 3, 0, 0, 0, 0, 0], np.zeros(8)], float)
-    np.testing.assert_allclose(building.success_window(scores), [0.89 * 4 / 8, 0.0, 0.0])
-    # The middle of band 2 twice; without any reward, the middle of the whole range (band 3).
-    np.testing.assert_allclose(building.best_critical(scores), 0.01 + 0.89 * np.array([2.5, 2.5, 3.5]) / 8)
-
-
-def test_a_scan_plays_each_row_with_its_own_gain():
-    source = MinjerkSource()
-    rows = setting.to_frame([source.sample(np.random.default_rng(0))] * 2).assign(gain=[2.0, 1.0])
-    scores = building.scan(source, rows, Engine(6, 1), points=3)
-    swapped = building.scan(source, rows.iloc[::-1], Engine(6, 1), points=3)
-    np.testing.assert_array_equal(scores, swapped[::-1])
-    assert scores[0, 0] > 1  # Closes at d_c = 0.158, like the paper's expert of this environment.
-    assert scores[0, 2] == 0  # Closes at 0.752, long before it reaches the bottle.
 
 
 # `minjerk` has one expert and no offsets.

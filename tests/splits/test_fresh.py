@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts import branching
 from dextron_bench.experts.branching import ExpertBatch, Outcomes
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.reaches.setting import Setting
@@ -33,7 +34,7 @@ def play(engine: Engine, batches: Iterable[ExpertBatch]) -> Iterator[tuple[int, 
 def instant(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Replaces the simulation, except in slow tests."""
     if not request.node.get_closest_marker("slow"):
-        monkeypatch.setattr(fresh.branching, "play", play)
+        monkeypatch.setattr(branching, "play", play)
 
 
 def test_there_are_as_many_as_in_the_split_on_its_reaches_only_with_an_expert_that_solves_each():

@@ -1,0 +1,85 @@
+"""The split `hard`: settings that only a precise closing moment solves, and often not the moment of a simple rule."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from dextron_bench.experts import montecarlo, policies
+from dextron_bench.reaches import reach, rotation, setting
+from dextron_bench.splits.near_equal import without_near_equal
+from dextron_bench.splits.scanning import RANGE, Scanner, best_critical, success_window
+from dextron_bench.world import task
+
+WINDOW = 0.08  # Largest window of a row.
+RULE_SHARE = 0.5  # Largest share of the rows that the rule of thumb solves.
+FULL_SPEED = 1e6  # A gain so large that an expert only opens and closes at full speed.
+DISTANCES = np.arange(10, 21) * 0.005  # [m] distances from the bottle, of which the rule takes the best.
+BLOCK = 512  # Settings that are drawn together.
+
+
+def draw(
+    scanner: Scanner,
+    train: pd.DataFrame,
+    held_out: pd.DataFrame,
+    distance: float,
+    seed: int,
+    count: int,
+    coarse: int,
+    fine: int,
+) -> pd.DataFrame:
+    """`count` new settings on the reaches of `train`, with gain, best d_c and a window of at most WINDOW.
+
+    The rule that closes at `distance` [m] solves at most RULE_SHARE of the rows. No setting is near-equal to one of
+    `train` or `held_out`. A scan of `coarse` points sorts out most draws, and one of `fine` points decides.
+    """
+    hard, by_rule = pd.DataFrame(), 0
+    blocks = _narrow(scanner, train, seed, coarse, fine)
+    while len(hard) < count:
+        narrow = next(blocks)
+        rows = without_near_equal(without_near_equal(narrow, train), held_out)
+        solved = rule_scores(scanner, rows, np.array([distance]))[:, 0] == task.SUCCESS
+        kept = ~solved | (by_rule + np.cumsum(solved) <= RULE_SHARE * count)
+        by_rule += int((solved & kept).sum())
+        hard = pd.concat([hard, rows[kept]], ignore_index=True)
+    return hard.head(count)
+
+
+def _narrow(scanner: Scanner, train: pd.DataFrame, seed: int, coarse: int, fine: int) -> Iterator[pd.DataFrame]:
+    """The settings of one block of draws after the other, without end, that have a narrow window."""
+    for number in itertools.count():
+        draws = _draw_block(scanner.source, train, np.random.default_rng([seed, number, 5]))
+        points = (scanner.scan(draws, coarse) == task.SUCCESS).sum(axis=1)
+        likely = draws[(points > 0) & (points <= np.ceil(WINDOW / RANGE * coarse))]
+        scores = scanner.scan(likely, fine)
+        windows = success_window(scores)
+        found = likely.assign(critical=best_critical(scores), window=windows)
+        yield found[(windows > 0) & (windows <= WINDOW)]
+
+
+def _draw_block(source: setting.Source, train: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """BLOCK settings, each on the reach of a random row of `train`, with uniform gains."""
+    reaches = rng.choice(train["reach"].to_numpy(), BLOCK)
+    settings = [montecarlo.OfReaches(source, frozenset([str(name)])).sample(rng) for name in reaches]
+    return setting.to_frame(settings).assign(gain=rng.uniform(*policies.GAIN, BLOCK))
+
+
+def best_distance(scanner: Scanner, rows: pd.DataFrame) -> float:
+    """The distance of DISTANCES [m] at which the rule of thumb has most successes in `rows`."""
+    successes = (rule_scores(scanner, rows, DISTANCES) == task.SUCCESS).sum(axis=0)
+    return float(DISTANCES[np.argmax(successes)])
+
+
+def rule_scores(scanner: Scanner, rows: pd.DataFrame, distances: np.ndarray) -> np.ndarray:
+    """Sums of rewards (rows, m) of the rule of thumb, which closes at full speed within a distance (m,) [m]."""
+    first = np.array([first_distance(scanner.source.path(case)) for case in setting.from_frame(rows)])
+    return scanner.play(rows.assign(gain=FULL_SPEED), distances / first[:, None])
+
+
+def first_distance(path: reach.Path) -> float:
+    """Horizontal distance of the palm's centre from the bottle at the start of a path [m]."""
+    centre = path.positions[0] + reach.PALM_AHEAD + rotation.rotate(path.quaternions[0], reach.PALM_CENTRE)
+    return float(np.sqrt((centre[:2] ** 2).sum()))
