@@ -13,6 +13,7 @@ from dextron_bench.cli import (
     doctor,
     figures,
     leaderboard,
+    leaderboard_fresh,
     leaderboard_verify,
     mc,
     new_agent,
@@ -43,10 +44,11 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "eval": evaluation.Eval,
     "leaderboard": (
         "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
-        "add a submission to it.",
+        "add a submission to it; play fresh settings.",
         {
             **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
             **{"verify": leaderboard_verify.Verify, "add": leaderboard_verify.Add},
+            "fresh": leaderboard_fresh.Fresh,
         },
     ),
     "new-agent": new_agent.NewAgent,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import tyro
 
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
-from dextron_bench.cli.output import progress_bar
+from dextron_bench.cli.output import print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
 from dextron_bench.storage.printable import printable
 
@@ -41,12 +41,19 @@ class Verify:
     """With --all: only the rows of these methods."""
     reaches: tuple[SourceName, ...] = ()
     """With --all: only rows on these sources; `real` needs the recorded reaches."""
+    redraw: bool = False
+    """With --all: also draw the fresh settings of every row again from its beacon; this takes minutes for each."""
     stamp: bool = False
     """With --all: give baselines that ran again completely the tier `re-run`, and build the leaderboard."""
     rerun: bool = False
     """Also run the agent of the submission again, in a sandbox, from the files in its bundle."""
     trust: bool = False
     """With --rerun: run the agent even without a sandbox, with all your rights; its tier stays `replayed`."""
+    beacon: str = ""
+    """With --rerun: a public value that did not exist when the submission was made, from which fresh settings follow;
+    by default a random one."""
+    fresh_rows: int = 0
+    """With --rerun: how many fresh settings of each split its agent plays; 0 means as many as the split has."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard."""
     threads: int = 0
@@ -70,7 +77,7 @@ class Verify:
         sound = True
         for row in verify_board.rows(self.board, self.method, self.reaches):
             with progress_bar(row.name, self.quiet) as progress:
-                finding = verify_board.check(row, self.rows, self.threads, progress)
+                finding = verify_board.check(row, self.board, self.rows, self.redraw, self.threads, progress)
             done = finding.done if not finding.problems else "DIFFERS from its episodes"
             print(printable(f"{row.name}: {done}"), flush=True)
             for problem in finding.problems[:SHOWN]:
@@ -100,8 +107,18 @@ class Add:
     """Also run its agent again, in a sandbox; the tier of its row is then `re-run` instead of `replayed`."""
     trust: bool = False
     """With --rerun: run the agent even without a sandbox, with all your rights; its tier stays `replayed`."""
+    beacon: str = ""
+    """With --rerun: a public value that did not exist when the submission was made, from which fresh settings follow;
+    by default a random one."""
+    fresh_rows: int = 0
+    """With --rerun: how many fresh settings of each split its agent plays; 0 means as many as the split has."""
     replace: bool = False
     """Replace a submission of the same name."""
+    beacon: str = ""
+    """With --rerun: a public value that did not exist when the submission was made, from which fresh settings follow;
+    by default a random one."""
+    fresh_rows: int = 0
+    """With --rerun: how many fresh settings of each split its agent plays; 0 means as many as the split has."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard."""
     threads: int = 0
@@ -132,10 +149,17 @@ def unpacked(file: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 
 def _verify(opened: tuple[Path, dict[str, Any]], flags: Verify | Add) -> Verdict:
+    from dextron_bench.leaderboard.fresh_settings import FreshSettings
     from dextron_bench.leaderboard.submission import verification
+    from dextron_bench.storage import hashing
 
+    assert flags.bundle is not None
+    drawn = {"submission": hashing.sha256(flags.bundle), "rows": flags.fresh_rows}
+    fresh = FreshSettings(**drawn, beacon=flags.beacon) if flags.beacon else FreshSettings(**drawn)
     with progress_bar("verifying", flags.quiet) as progress:
-        return verification.verify(*opened, flags.board, flags.rerun, flags.threads, trust=flags.trust, report=progress)
+        return verification.verify(
+            *opened, flags.board, flags.rerun, flags.threads, trust=flags.trust, fresh=fresh, report=progress
+        )
 
 
 def print_verdict(verdict: Verdict) -> int:
@@ -145,6 +169,28 @@ def print_verdict(verdict: Verdict) -> int:
         print(printable(f"note: {note}"))
     if verdict.passed:
         print(f"{name}: {verdict.tier}; {verdict.exact} of {verdict.episodes} episodes equal bit for bit")
+        print_fresh(verdict)
         return DONE
     print(f"{name}: refused", *map(printable, verdict.problems), sep="\n  ")
     return DIFFERS
+
+
+def print_fresh(verdict: Verdict) -> None:
+    """Prints what the agent scored on fresh settings, beside its scores on the splits, if it played any."""
+    from dextron_bench.scores import cells, standings
+
+    rows = standings.table(verdict.results.values())
+    if not rows["fresh"].notna().any():
+        return
+    beacon = next(iter(verdict.results.values()))["fresh"]["beacon"]
+    lines = [
+        [
+            row["split"],
+            cells.mean_return(row),
+            cells.fresh(row),
+            cells.gap(row),
+            "beyond noise" if row["marked"] else "",
+        ]
+        for row in rows.to_dict("records")
+    ]
+    print_table(f"fresh settings, beacon {printable(beacon)}", ["split", "return", "fresh", "gap", ""], lines)

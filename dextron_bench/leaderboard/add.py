@@ -11,7 +11,7 @@ from dextron_bench.leaderboard.submission.entry import BadSubmission
 from dextron_bench.leaderboard.submission.verdict import Verdict
 from dextron_bench.methods import registry
 from dextron_bench.runs import run_files
-from dextron_bench.storage import atomic, folders
+from dextron_bench.storage import atomic, folders, tables
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import RunFolder
 
@@ -51,5 +51,7 @@ def _put(verdict: Verdict, board: Path) -> None:
         run = RunFolder.of_seed(place, seed)
         run.path.mkdir(parents=True)
         run_files.store_episodes(run, verdict.tables[seed])
+        if seed in verdict.fresh:
+            tables.write(run.fresh, verdict.fresh[seed])
         atomic.write_json(run.result, {**result, "tier": verdict.tier})
     atomic.write_json(place / bundle.MANIFEST, manifest)

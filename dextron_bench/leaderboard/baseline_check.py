@@ -49,7 +49,7 @@ def rerun(run: RunFolder, result: dict[str, Any], count: int, threads: int, repo
             if fault := _fault(claimed, split):
                 finding.problems.append(fault)
                 continue
-            done += _rerun_split(run, result, split, _rows(len(split.cases), count), threads, finding)
+            done += _rerun_split(run, result, split, drawn_rows(len(split.cases), count), threads, finding)
             report(done, total)
     except (NotReproducible, weights.MissingWeights, AgentError) as error:
         finding.problems.append(str(error))
@@ -71,7 +71,7 @@ def _rerun_split(
 ) -> int:
     """Runs the agent on rows of a split and adds the differences; returns how many rows it played in the end."""
     source, cases = sources.open_source(split.reaches), [split.cases[row] for row in rows]
-    episodes = dict(rollout(_agent(run, result), source, cases, threads=threads))
+    episodes = dict(rollout(agent_of(run, result), source, cases, threads=threads))
     table = pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
     computed, whole = result_files.scores_by_split(table)[split.name], len(rows) == len(split.cases)
     differences = list(_differences(result["splits"][split.name], computed, rows, whole))
@@ -95,14 +95,14 @@ def _differences(claimed: dict[str, Any], computed: dict[str, Any], rows: np.nda
             yield f"says {name.replace('_', ' ')} {claimed[name]}; run again it is {computed[name]}"
 
 
-def _rows(total: int, count: int) -> np.ndarray:
+def drawn_rows(total: int, count: int) -> np.ndarray:
     """All row numbers, or `count` drawn at random, in order: nobody can know which rows are verified."""
     if not 0 < count < total:
         return np.arange(total)
     return np.sort(np.random.default_rng().choice(total, count, replace=False))
 
 
-def _agent(run: RunFolder, result: dict[str, Any]) -> Agent:
+def agent_of(run: RunFolder, result: dict[str, Any]) -> Agent:
     """The agent of a row, from the code and the weights that ship; raises NotReproducible and others."""
     maker, seed = result.get("maker", {}), result["seed"]
     if maker.get("method") not in registry.installed_methods():

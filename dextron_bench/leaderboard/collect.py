@@ -65,14 +65,15 @@ def _is_complete(result: dict[str, Any]) -> bool:
 
 
 def _with_tier(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
-    """A result with the tier and hashes of actions of the one that it replaces, if both have the same scores."""
-    if "tier" not in before or _scores(result) != _scores(before):
+    """A result with what was verified of the one that it replaces, if both have the same scores."""
+    if not before or _scores(result) != _scores(before):
         return result
     hashes = {name: before["splits"][name].get("actions") for name in result["splits"]}
     splits = {
         name: split | ({"actions": hashes[name]} if hashes[name] else {}) for name, split in result["splits"].items()
     }
-    return {**result, "splits": splits, "tier": before["tier"]}
+    kept = {name: before[name] for name in ("tier", "fresh") if name in before}
+    return {**result, "splits": splits, **kept}
 
 
 def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]:

@@ -48,7 +48,9 @@ def sections(rows: pd.DataFrame, with_curves: set[str]) -> Iterator[str]:
 def _scores(source: str, rows: pd.DataFrame) -> Iterator[str]:
     """Returns and successes on every split, a line for each method."""
     splits = [name for name in SPLIT_NAMES if name in set(rows["split"])]
-    yield f"\n## {source} reaches\nMean return of 20 with its 95 % interval, and successes [%].\n"
+    fresh = "; mean return on [fresh settings](../docs/leaderboard.md#fresh-settings)"
+    also = fresh if rows["fresh"].notna().any() else ""
+    yield f"\n## {source} reaches\nMean return of 20 with its 95 % interval, and successes [%]{also}.\n"
     yield _line(["rank", "method", "seeds", "tier", *(f"`{name}`" for name in splits)])
     yield _line(["---"] * (4 + len(splits)))
     for method in rows[rows["split"] == "test"]["method"]:
@@ -68,7 +70,8 @@ def _endings(rows: pd.DataFrame) -> Iterator[str]:
 
 
 def _score(row: cells.Row) -> str:
-    return f"{cells.mean_return(row)}, {cells.success(row).value} %"
+    fresh = ", ".join(filter(None, (cells.fresh(row).value, cells.mark(row))))
+    return f"{cells.mean_return(row)}, {cells.success(row).value} %" + (f"; fresh {fresh}" if fresh else "")
 
 
 def _line(values: Iterable[object]) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from dextron_bench.leaderboard import baseline_check, build, collect
+from dextron_bench.leaderboard import baseline_check, build, collect, fresh_baselines
 from dextron_bench.leaderboard.baseline_check import Finding
 from dextron_bench.leaderboard.highlights import FOLDER
 from dextron_bench.leaderboard.submission import bundle, episode_tables, replay_check
@@ -56,14 +56,23 @@ def rows(board: Path, methods: Sequence[str] = (), reaches: Sequence[str] = ()) 
     return selected
 
 
-def check(row: Row, count: int = 0, threads: int = 0, report: Progress = no_progress) -> Finding:
-    """Verifies a row of a board; runs a baseline again on `count` rows of each split, drawn at random, 0 for all."""
+def check(
+    row: Row, board: Path, count: int = 0, redraw: bool = False, threads: int = 0, report: Progress = no_progress
+) -> Finding:
+    """Verifies a row of a board; runs a baseline again on `count` rows of each split, drawn at random, 0 for all.
+
+    With `redraw`, fresh settings are drawn again from their beacon, too.
+    """
     try:
         if row.run.episodes.exists():
-            return _replay(row, threads, report)
-        return baseline_check.rerun(row.run, row.result, count, threads, report)
+            finding = _replay(row, threads, report)
+        else:
+            finding = baseline_check.rerun(row.run, row.result, count, threads, report)
+        if "fresh" in row.result and not finding.problems:
+            finding.problems += fresh_baselines.problems(row.run, row.result, board, count, redraw, threads, report)
     except MissingData as error:
         return Finding("", [f"not checked: {error}"])
+    return finding
 
 
 def stamp(row: Row, finding: Finding) -> bool:

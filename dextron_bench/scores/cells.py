@@ -45,6 +45,21 @@ def interquartile_mean(row: Row) -> Score:
     return _score(row, "iqm", 2)
 
 
+def fresh(row: Row) -> Score:
+    """Mean return on fresh settings, 0 to 20."""
+    return _score(row, "fresh", 2)
+
+
+def gap(row: Row) -> Score:
+    """How much more the method scores on the split than on fresh settings."""
+    return _score(row, "gap", 2)
+
+
+def mark(row: Row) -> str:
+    """What a marked row says of its gap, which is beyond noise; empty for other rows."""
+    return "not on fresh settings" if row.get("marked") else ""
+
+
 def regret(row: Row) -> str:
     """How much more EXP scores than the method."""
     return _number(row.get("regret"), 2)

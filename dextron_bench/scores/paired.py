@@ -5,7 +5,7 @@ Scores are arrays (seeds, settings). A column is the same setting for all method
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.stats import binomtest, norm
 
 from dextron_bench.scores import statistics
 
+NOISE = 3.29  # Standard errors; a difference due to chance exceeds them once in two thousand times.
 POWER = 0.8  # Chance that a difference of the size `detectable` is significant.
 
 
@@ -40,23 +41,55 @@ class Flips:
     p_value: float
 
 
-def difference(a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> Difference:
+def difference(a: np.ndarray, b: np.ndarray, rng: np.random.Generator, same_settings: bool = True) -> Difference:
     """Mean of scores B minus mean of scores A, both (seeds, settings), by a bootstrap of the difference.
 
     Each resample draws settings once for both methods, and seeds for each method separately. Equal generators give
-    opposite differences for (a, b) and (b, a).
+    opposite differences for (a, b) and (b, a). Without `same_settings`, it draws the settings of each separately, too.
     """
-    settings = statistics.draw_counts(a.shape[1], rng)
+    settings = statistics.draw_counts(a.shape[1], rng) if same_settings else None
     swap = b.tobytes() < a.tobytes()  # The order of the draws must not depend on which method is called A.
-    first, second = (statistics.resampled_means(scores, settings, rng) for scores in ((b, a) if swap else (a, b)))
+    first, second = (_resampled(scores, settings, rng) for scores in ((b, a) if swap else (a, b)))
     resamples = first - second if swap else second - first
     estimate = statistics.interval(float(b.mean() - a.mean()), resamples)
     return Difference(estimate.mean, estimate.low, estimate.high, detectable(resamples))
 
 
-def published_difference(a: np.ndarray, b: np.ndarray) -> Difference:
+def _resampled(scores: np.ndarray, settings: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
+    """Means of resamples with given counts of settings, or with counts that are drawn here."""
+    counts = statistics.draw_counts(scores.shape[1], rng) if settings is None else settings
+    return statistics.resampled_means(scores, counts, rng)
+
+
+def published_difference(a: np.ndarray, b: np.ndarray, same_settings: bool = True) -> Difference:
     """The difference that ranks and `compare` use: equal scores give the same interval everywhere."""
-    return difference(a, b, np.random.default_rng(0))
+    return difference(a, b, np.random.default_rng(0), same_settings)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap(statistics.Estimate):
+    """How much more a method scores on known settings than on fresh ones, with its 95 % interval.
+
+    `is_beyond_noise` is true if it exceeds NOISE standard errors: few honest rows of a large board may do so by chance.
+    """
+
+    is_beyond_noise: bool
+
+
+def gap(known: np.ndarray, fresh: np.ndarray, rng: np.random.Generator) -> Gap:
+    """Mean of scores on known settings minus mean on fresh settings, both (seeds, settings) of one method.
+
+    Each resample draws the two kinds of settings independently, and the same seeds for both.
+    """
+    seeds = statistics.draw_counts(len(known), rng)
+    known_means, fresh_means = (
+        (seeds * (statistics.draw_counts(scores.shape[1], rng) @ scores.T)).sum(axis=1) / scores.size
+        for scores in (known, fresh)
+    )
+    resamples = known_means - fresh_means
+    estimate = statistics.interval(float(known.mean() - fresh.mean()), resamples)
+    beyond = estimate.mean > NOISE * float(resamples.std())
+    return Gap(estimate.mean, estimate.low, estimate.high, beyond)
 
 
 def detectable(resamples: np.ndarray) -> float:
@@ -81,18 +114,20 @@ def flips(a: np.ndarray, b: np.ndarray) -> Flips:
     return Flips(gained, lost, float(binomtest(len(gained), changed).pvalue) if changed else 1.0)
 
 
-def ranks(scores: Sequence[np.ndarray]) -> list[int]:
+def ranks(scores: Sequence[np.ndarray], own_settings: Collection[int] = ()) -> list[int]:
     """Ranks from 1; methods that do not differ significantly from the best of their group share its rank.
 
     Methods are taken from the highest mean down. A method starts a new group if the interval of its
     `published_difference` from the first method of the current group excludes 0; its rank is then its position.
-    Each entry of `scores` is (seeds, settings) on the same settings. Equal means are ordered by their scores, so the
+    Each entry of `scores` is (seeds, settings) on the same settings; those at the places `own_settings` are on settings
+    that no other method has. Equal means are ordered by their scores, so the
     order of the input does not matter.
     """
     order = sorted(range(len(scores)), key=lambda method: (-scores[method].mean(), scores[method].tobytes()))
     method_ranks, rank, leader = [0] * len(scores), 0, -1
     for position, method in enumerate(order, start=1):
-        if rank == 0 or _is_significant(published_difference(scores[leader], scores[method])):
+        same = method not in own_settings and leader not in own_settings
+        if rank == 0 or _is_significant(published_difference(scores[leader], scores[method], same)):
             leader, rank = method, position
         method_ranks[method] = rank
     return method_ranks

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, get_args
 
 import numpy as np
@@ -20,8 +21,17 @@ COLUMNS = (
     "rank", "method", "reaches", "split", "version", "seeds", "episodes", "failed",
     "return", "return_low", "return_high", "success", "success_low", "success_high",
     "iqm", "iqm_low", "iqm_high", "regret", *CAUSES, "closing_lag",
+    "fresh", "fresh_low", "fresh_high", "gap", "gap_low", "gap_high", "marked",
 )  # fmt: skip
 Board = dict[str, list[dict[str, Any]]]  # By method: what each of its seeds scored on one version of a split.
+
+
+@dataclass(frozen=True, slots=True)
+class Fresh:
+    """What a method scores on fresh settings (seeds, settings), and how much less that is than on known ones."""
+
+    scores: np.ndarray
+    gap: paired.Gap
 
 
 class UnevenResults(ValueError):
@@ -34,11 +44,19 @@ def table(results: Iterable[dict[str, Any]]) -> pd.DataFrame:
     `results` are the contents of `result.json` files, one for each seed. Success rates lie in [0, 1]. The columns
     CAUSES count episodes. `closing_lag` [s] is the mean over seeds of their medians, NaN if no hand closed. `rank` is
     NaN for methods that are not ranked, `iqm` for splits that do not ship, `regret` if EXP has no scores.
+
+    `fresh` is the mean return on fresh settings, and `gap` how much higher `return` is; NaN if some seed did not play
+    fresh settings. A row is `marked` if its gap is beyond noise; its place and its rank then follow from `fresh`.
     Raises UnevenResults.
     """
     rows = [row for key, board in _boards(results).items() for row in _rows(key, board)]
-    return pd.DataFrame(rows, columns=list(COLUMNS)).sort_values(
-        ["reaches", "split", "return", "method"], ascending=[True, True, False, True], ignore_index=True
+    table = pd.DataFrame(rows, columns=list(COLUMNS))
+    ranked_by = table["return"].where(~table["marked"].astype(bool), table["fresh"])
+    order = ["reaches", "split", "ranked_by", "method"]
+    return (
+        table.assign(ranked_by=ranked_by)
+        .sort_values(order, ascending=[True, True, False, True], ignore_index=True)
+        .drop(columns="ranked_by")
     )
 
 
@@ -52,7 +70,9 @@ def _boards(results: Iterable[dict[str, Any]]) -> dict[tuple[str, str, str], Boa
     boards: dict[tuple[str, str, str], Board] = defaultdict(lambda: defaultdict(list))
     for result in results:
         for name, split_result in result["splits"].items():
-            boards[(result["reaches"], name, split_result["digest"])][result["method"]].append(split_result)
+            fresh = result.get("fresh", {}).get("splits", {}).get(name)
+            board = boards[(result["reaches"], name, split_result["digest"])]
+            board[result["method"]].append(split_result | {"fresh": fresh})
     return boards
 
 
@@ -67,8 +87,12 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
         )
     scores = {method: np.array([seed["scores"] for seed in seeds], float) for method, seeds in board.items()}
     settings = statistics.draw_counts(lengths.pop(), np.random.default_rng(0))
+    fresh = {method: _fresh(method, seeds, scores[method]) for method, seeds in board.items()}
+    marked = {method: known.scores for method, known in fresh.items() if known and known.gap.is_beyond_noise}
     ranked = [method for method in scores if is_ranked(method, reaches)]
-    ranks = dict(zip(ranked, paired.ranks([scores[method] for method in ranked]), strict=True))
+    own_settings = [place for place, method in enumerate(ranked) if method in marked]
+    ranked_by = [marked.get(method, scores[method]) for method in ranked]
+    ranks = dict(zip(ranked, paired.ranks(ranked_by, own_settings), strict=True))
     regions = strata.start_regions(reaches, split, digest)
     ceiling = next((scores[method].mean() for method in registry.CEILINGS if method in scores), np.nan)
     for method, returns in scores.items():
@@ -78,7 +102,25 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
             **_estimates(method, returns, settings, regions),
             "regret": ceiling - returns.mean(),
             **_endings(board[method]),
+            **_fresh_columns(method, fresh[method]),
         }
+
+
+def _fresh(method: str, seeds: Sequence[dict[str, Any]], known: np.ndarray) -> Fresh | None:
+    """The scores of a method on fresh settings; None if some seed has none, or if seeds played different ones."""
+    played = [seed["fresh"] for seed in seeds]
+    if None in played or len({one["digest"] for one in played}) > 1:
+        return None
+    scores = np.array([one["scores"] for one in played], float)
+    return Fresh(scores, paired.gap(known, scores, _method_rng(method)))
+
+
+def _fresh_columns(method: str, fresh: Fresh | None) -> dict[str, Any]:
+    """Mean return on fresh settings and gap with their intervals, and whether the gap is beyond noise."""
+    if fresh is None:
+        return {"marked": False}
+    estimates = {"fresh": statistics.estimate(fresh.scores, _method_rng(method)), "gap": fresh.gap}
+    return {"marked": fresh.gap.is_beyond_noise} | _with_ends(estimates)
 
 
 def _estimates(method: str, returns: np.ndarray, settings: np.ndarray, regions: np.ndarray | None) -> dict[str, float]:
@@ -90,6 +132,11 @@ def _estimates(method: str, returns: np.ndarray, settings: np.ndarray, regions: 
     }
     if regions is not None:
         estimates["iqm"] = statistics.interquartile_mean(returns, regions, _method_rng(method))
+    return _with_ends(estimates)
+
+
+def _with_ends(estimates: Mapping[str, statistics.Estimate]) -> dict[str, float]:
+    """The columns of estimates: each mean, and the ends of its interval."""
     columns: dict[str, float] = {}
     for name, estimate in estimates.items():
         columns |= {name: estimate.mean, f"{name}_low": estimate.low, f"{name}_high": estimate.high}

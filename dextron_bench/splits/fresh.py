@@ -6,22 +6,31 @@ A policy that has learned a split by heart scores less on them.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
 
 from dextron_bench.experts import montecarlo
+from dextron_bench.experts.policies import Case
 from dextron_bench.reaches import setting
-from dextron_bench.splits.loading import Split, cases_from_frame, split_digest
+from dextron_bench.reaches.sources import open_source
+from dextron_bench.splits import hard
+from dextron_bench.splits.building import Sizes
+from dextron_bench.splits.loading import Split, cases_from_frame, known_splits, load_split, split_digest
 from dextron_bench.splits.near_equal import SETTING
+from dextron_bench.splits.scanning import Scanner
 from dextron_bench.storage import hashing
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
 
 BLOCK = 128  # Settings that are drawn and played together; another number draws other settings.
-DRAWN = ("test", "unseen-reach", "unseen-subject")  # Splits whose rows are solved draws of a search, and nothing else.
+REACHES = {  # The splits whose reaches a fresh split has: the same distribution as the split itself.
+    "test": ("train", "val", "test"),
+    "unseen-reach": ("unseen-reach",),
+    "unseen-subject": ("unseen-subject",),
+}
 
 
 class NoFreshSettings(ValueError):
@@ -33,25 +42,39 @@ def seed_of(submission: str, beacon: str) -> int:
     return int(hashing.digest(f"{submission}\n{beacon}".encode())[:16], 16)
 
 
-def draw(
-    source: setting.Source, split: Split, seed: int, engine: Engine, rows: int = 0, progress: Progress = no_progress
-) -> Split:
-    """A split of `rows` fresh cases (0: as many as `split` has) on the reaches of `split`; equal for equal seeds.
+def draw(reaches: str, name: str, seed: int, engine: Engine, rows: int = 0, progress: Progress = no_progress) -> Split:
+    """A split of `rows` fresh cases (0: as many as the shipped split `name` has); equal for equal seeds.
 
     Offsets and duration noise are drawn anew, and a setting is kept if a search with eight experts solves it. Each case
-    has one of the experts that solve it, and no window. Raises NoFreshSettings.
+    has one of the experts that solve it, and no window. `hard` is drawn as it was built. Raises NoFreshSettings,
+    UnknownSplit, MissingData.
     """
-    if split.name not in DRAWN or source.name == "minjerk":
-        raise NoFreshSettings(f"{split.name} of {source.name} reaches is not drawn by a search; choose from {DRAWN}")
-    count, solved = rows or len(split.cases), pd.DataFrame()
-    reaches = frozenset(case.setting.reach for case in split.cases)
-    for block in _solved_blocks(source, reaches, seed, engine):
-        solved = pd.concat([solved, block], ignore_index=True)
-        progress(min(len(solved), count), count)
-        if len(solved) >= count:
-            break
-    fresh = solved.head(count).assign(window=0.0)
-    return Split(split.name, split.reaches, tuple(cases_from_frame(fresh)), split_digest(fresh))
+    if reaches == "minjerk" or name not in (*REACHES, "hard"):
+        raise NoFreshSettings(f"{name} of {reaches} reaches is not drawn by a search; choose from {list(REACHES)}")
+    source, count = open_source(reaches), rows or len(load_split(reaches, name).cases)
+    if name == "hard":
+        table = _hard(source, reaches, count, seed, engine)
+    else:
+        names = {case.setting.reach for part in REACHES[name] for case in _cases(reaches, part)}
+        table = solved(source, frozenset(names), count, seed, engine, progress)
+    return Split(name, reaches, tuple(cases_from_frame(table)), split_digest(table))
+
+
+def solved(
+    source: setting.Source,
+    reaches: frozenset[str],
+    count: int,
+    seed: int,
+    engine: Engine,
+    progress: Progress = no_progress,
+) -> pd.DataFrame:
+    """`count` settings on some reaches of a source that a search solves, each with one of the experts that do."""
+    rows = pd.DataFrame()
+    blocks = _solved_blocks(source, reaches, seed, engine)
+    while len(rows) < count:
+        rows = pd.concat([rows, next(blocks)], ignore_index=True)
+        progress(min(len(rows), count), count)
+    return rows.head(count).assign(window=0.0)
 
 
 def _solved_blocks(
@@ -59,8 +82,27 @@ def _solved_blocks(
 ) -> Iterator[pd.DataFrame]:
     """The solved settings of one block of draws after the other, without end: a row for each setting."""
     search = montecarlo.Search(source.name, seed, block=BLOCK)
-    drawn = ((k, montecarlo.draw(montecarlo.OfReaches(source, reaches), search, k)) for k in itertools.count())
+    part = montecarlo.OfReaches(source, reaches)
+    drawn = ((number, montecarlo.draw(part, search, number)) for number in itertools.count())
     for number, draws in montecarlo.play_blocks(source, engine, drawn, search.experts):
-        solved = draws[draws["score"] == task.SUCCESS]
-        shuffled = solved.sample(frac=1.0, random_state=np.random.default_rng([seed, number, 4]))
+        successful = draws[draws["score"] == task.SUCCESS]
+        shuffled = successful.sample(frac=1.0, random_state=np.random.default_rng([seed, number, 4]))
         yield shuffled.drop_duplicates(SETTING).sort_index()
+
+
+def _cases(reaches: str, name: str) -> Sequence[Case]:
+    """The cases of a shipped split; none if the source has no such split."""
+    return load_split(reaches, name).cases if name in known_splits(reaches) else ()
+
+
+def _hard(source: setting.Source, reaches: str, count: int, seed: int, engine: Engine) -> pd.DataFrame:
+    """Fresh rows of `hard`, with the distance that is best for the rule of thumb on `val`."""
+    scanner, sizes = Scanner(source, engine), Sizes()
+    train, val = (_frame(_cases(reaches, name)) for name in ("train", "val"))
+    distance = hard.best_distance(scanner, val)
+    rows = hard.draw(scanner, train, train.head(0), distance, seed, count, sizes.coarse, sizes.scan)
+    return rows.assign(window=0.0)
+
+
+def _frame(cases: Sequence[Case]) -> pd.DataFrame:
+    return setting.to_frame([case.setting for case in cases]).assign(gain=[case.expert.gain for case in cases])

@@ -17,7 +17,7 @@ from dextron_bench.world import task
 WINDOW = 0.08  # Largest window of a row.
 RULE_SHARE = 0.5  # Largest share of the rows that the rule of thumb solves.
 FULL_SPEED = 1e6  # A gain so large that an expert only opens and closes at full speed.
-DISTANCES = np.arange(10, 21) * 0.005  # [m] distances from the bottle, of which the rule takes the best.
+DISTANCES = np.arange(10, 21) * 0.005  # [m] from the bottle; the rule takes the best.
 BLOCK = 512  # Settings that are drawn together.
 
 
@@ -56,8 +56,8 @@ def _narrow(scanner: Scanner, train: pd.DataFrame, seed: int, coarse: int, fine:
         likely = draws[(points > 0) & (points <= np.ceil(WINDOW / RANGE * coarse))]
         scores = scanner.scan(likely, fine)
         windows = success_window(scores)
-        found = likely.assign(critical=best_critical(scores), window=windows)
-        yield found[(windows > 0) & (windows <= WINDOW)]
+        measured = likely.assign(critical=best_critical(scores), window=windows)
+        yield measured[(windows > 0) & (windows <= WINDOW)]
 
 
 def _draw_block(source: setting.Source, train: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:

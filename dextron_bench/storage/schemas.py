@@ -150,10 +150,14 @@ SPLIT_SCORES = entries(
     },
     {"actions": list_of(text)},
 )
+FRESH_SCORES = entries({"digest": text, "scores": list_of(RETURN, 1)})
+FRESH = entries({"beacon": text, "submission": text, "splits": map_of(FRESH_SCORES)})
+FRESH_SETTINGS = entries({"beacon": text, "submission": text, "rows": COUNT})
 RESULT = entries(
     {"method": text, "reaches": text, "seed": COUNT, "splits": map_of(SPLIT_SCORES, 1)},
     {
         **{"tier": text, "privileged": or_none(text), "declared": or_none(DECLARED), "provenance": PROVENANCE},
+        "fresh": FRESH,
         **{"training": or_none(TRAINING), "maker": entries({}, {"method": text, "settings": OBJECT, "code": CODE})},
     },
 )

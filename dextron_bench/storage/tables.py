@@ -52,6 +52,8 @@ EPISODES: Columns = {  # Of a run.
     **dict.fromkeys(("split", "digest", "failure", "cause"), texts),
     **{"row": counts, "length": counts, "success": flags, "score": returns, "closing_lag": finite_or_missing},
 }
+CASES: Columns = {**SETTING, "split": texts, "gain": finite, "critical": finite}  # Of fresh settings.
+FRESH_EPISODES: Columns = {**EPISODES, **CASES}
 DRAWS: Columns = {  # Of a block of a search.
     **SETTING, "gain": finite, "critical": finite, "score": returns, "length": finite_or_missing
 }  # fmt: skip

@@ -162,3 +162,26 @@ def test_ranks_do_not_depend_on_the_order_of_methods(boards: list[np.ndarray], r
     assert paired.ranks([boards[k] for k in order]) == [ranks[k] for k in order]
     assert min(ranks) == 1
     assert ranks[int(np.argmax([board.mean() for board in boards]))] == 1
+
+
+def test_a_gap_is_beyond_noise_above_3_29_standard_errors():
+    """400 settings of 0 or 20 have a standard error of 1; two independent means differ with one of 1.41, so 4.65."""
+    known, fresh = around(15.0, 10.0)
+    result = paired.gap(known, fresh, rng())
+    assert result.mean == pytest.approx(5.0)
+    assert (result.high - result.low) / 2 == pytest.approx(1.96 * 2**0.5, rel=0.1)
+    assert result.is_beyond_noise
+    assert not paired.gap(known, fresh + 1.0, rng()).is_beyond_noise
+    assert not paired.gap(fresh, known, rng()).is_beyond_noise  # Better on fresh settings.
+
+
+def test_a_gap_may_have_other_numbers_of_settings():
+    assert paired.gap(np.full((2, 4), 20.0), np.full((2, 7), 5.0), rng()) == paired.Gap(15.0, 15.0, 15.0, True)
+
+
+def test_methods_on_settings_of_their_own_are_compared_without_pairs():
+    """A common draw of settings makes 0.1 certain; on settings of its own, the second method is within noise."""
+    (common,) = around(0.0)
+    boards = [10.0 + common, 9.9 + common]
+    assert paired.ranks(boards, own_settings=[1]) == [1, 1]
+    assert paired.ranks([10.0 + common, 2.0 + common[:, :100]], own_settings=[1]) == [1, 2]

@@ -118,3 +118,28 @@ def test_seeds_of_two_methods_are_drawn_independently():
         for k, mean in enumerate(seeds)
     ]
     assert column(results, "rank") == {"a": 1, "b": 1}
+
+
+def with_fresh(one: dict, scores: list[float], digest: str = "f" * 64) -> dict:
+    played = {"test": {"digest": digest, "scores": scores}}
+    return one | {"fresh": {"beacon": "b", "submission": "s", "splits": played}}
+
+
+def test_a_gap_beyond_noise_marks_a_row_and_ranks_it_by_its_fresh_scores():
+    """It knows the split by heart: 20 there, 3 on fresh settings, so that it comes after a method with 10."""
+    memory = with_fresh(result("memory", 0, [20.0] * 50), [3.0, 0.0, 6.0] * 10)
+    honest = with_fresh(noisy("honest", 0.0), noisy("honest", 0.0, seed=1)["splits"]["test"]["scores"])
+    rows = standings.table([memory, honest])
+    assert rows["method"].tolist() == ["honest", "memory"]
+    assert rows["marked"].tolist() == [False, True]
+    assert rows["rank"].tolist() == [1, 2]
+    assert rows.loc[1, ["return", "fresh", "gap"]].tolist() == [20.0, 3.0, 17.0]
+    assert rows.loc[1, "gap_low"] < 17.0 < rows.loc[1, "gap_high"]
+
+
+def test_fresh_scores_count_only_if_every_seed_has_them_on_equal_settings():
+    seeds = [result("a", k, [20.0, 20.0]) for k in range(2)]
+    assert np.isnan(column([with_fresh(seeds[0], [5.0]), seeds[1]], "fresh")["a"])
+    others = [with_fresh(seeds[0], [5.0]), with_fresh(seeds[1], [5.0], digest="e" * 64)]
+    assert np.isnan(column(others, "fresh")["a"])
+    assert column([with_fresh(seed, [5.0]) for seed in seeds], "fresh")["a"] == 5.0

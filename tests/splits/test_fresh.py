@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import branching
 from dextron_bench.experts.branching import ExpertBatch, Outcomes
-from dextron_bench.experts.policies import Case, Expert, ExpertAgent
-from dextron_bench.reaches.setting import Setting
+from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.splits import fresh
-from dextron_bench.splits.loading import Split, load_split
+from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.world.engine import Engine
+from tests.helpers import tiny_benchmark
 from tests.helpers.short_reaches import SOURCE
 
-CASES = (Case(Setting("a", 0.0, 0.0, 0.0), Expert(1.2, 0.3), 0.1),) * 150
-SPLIT = Split("test", "brief", CASES, "0" * 64)
 ENGINE = Engine(1, 1)
 
 
@@ -37,26 +37,46 @@ def instant(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
         monkeypatch.setattr(branching, "play", play)
 
 
-def test_there_are_as_many_as_in_the_split_on_its_reaches_only_with_an_expert_that_solves_each():
+def solved(seed: int, count: int = 150) -> pd.DataFrame:
+    return fresh.solved(SOURCE, frozenset("a"), count, seed, ENGINE)
+
+
+def test_there_are_as_many_as_asked_for_on_the_reaches_only_with_an_expert_that_solves_each():
     """A block of 128 settings has about 64 with the gain, so several blocks are drawn for 150."""
-    drawn = fresh.draw(SOURCE, SPLIT, 7, ENGINE)
-    assert (drawn.name, drawn.reaches, len(drawn.cases)) == ("test", "brief", 150)
-    assert {case.setting.reach for case in drawn.cases} == {"a"}
-    assert len({case.setting for case in drawn.cases}) == 150
-    assert all(case.expert.gain > 1.25 and 0.2 < case.expert.critical < 0.5 for case in drawn.cases)
+    drawn = solved(7)
+    assert len(drawn) == len(drawn.drop_duplicates(SETTING)) == 150
+    assert set(drawn["reach"]) == {"a"}
+    assert (drawn["gain"] > 1.25).all()
+    assert drawn["critical"].between(0.2, 0.5).all()
 
 
 def test_the_expert_of_a_setting_is_drawn_among_those_that_solve_it():
     """Not always the first: of the successful d_c, from 0.2 to 0.5, each third is taken about equally often."""
-    criticals = [case.expert.critical for case in fresh.draw(SOURCE, SPLIT, 7, ENGINE).cases]
-    counts, _ = np.histogram(criticals, bins=[0.2, 0.3, 0.4, 0.5])
+    counts, _ = np.histogram(solved(7)["critical"], bins=[0.2, 0.3, 0.4, 0.5])
     assert counts.min() > 30
 
 
 def test_equal_seeds_draw_equal_settings_and_other_seeds_do_not():
-    first = fresh.draw(SOURCE, SPLIT, 7, ENGINE)
-    assert fresh.draw(SOURCE, SPLIT, 7, ENGINE, rows=20).cases == first.cases[:20]
-    assert not set(fresh.draw(SOURCE, SPLIT, 8, ENGINE).cases) & set(first.cases)
+    pd.testing.assert_frame_equal(solved(7, 20), solved(7).head(20))
+    assert not set(solved(8)["offset_x"]) & set(solved(7)["offset_x"])
+
+
+@pytest.fixture
+def tiny(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Splits `val`, `test` and `unseen-reach` of two reaches."""
+    tiny_benchmark.install(tiny_benchmark.write(tmp_path), monkeypatch.setattr)
+    yield
+    tiny_benchmark.forget()
+
+
+def test_a_fresh_split_has_as_many_rows_as_the_shipped_one_on_reaches_of_the_same_distribution(tiny: None):
+    """`test` has reaches a and b; `unseen-reach` has b only."""
+    drawn = fresh.draw("synthetic", "test", 7, ENGINE)
+    assert (drawn.name, len(drawn.cases)) == ("test", 2)
+    held_out = fresh.draw("synthetic", "unseen-reach", 7, ENGINE, rows=30)
+    assert (len(held_out.cases), {case.setting.reach for case in held_out.cases}) == (30, {"b"})
+    assert {case.setting.reach for case in fresh.draw("synthetic", "test", 7, ENGINE, rows=30).cases} == {"a", "b"}
+    assert held_out.digest != fresh.draw("synthetic", "unseen-reach", 8, ENGINE, rows=30).digest
 
 
 def test_the_seed_depends_on_the_submission_and_on_the_beacon():
@@ -65,14 +85,14 @@ def test_the_seed_depends_on_the_submission_and_on_the_beacon():
     assert all(0 <= seed < 2**64 for seed in seeds)
 
 
-@pytest.mark.parametrize("name", ["hard", "open", "train"])
+@pytest.mark.parametrize("name", ["open", "train"])
 def test_splits_that_no_search_draws_are_refused(name: str):
     with pytest.raises(fresh.NoFreshSettings, match="is not drawn by a search"):
-        fresh.draw(SOURCE, Split(name, "brief", CASES, "0" * 64), 0, ENGINE)
+        fresh.draw("synthetic", name, 0, ENGINE)
 
 
 @pytest.mark.slow
 def test_experts_solve_fresh_settings_of_a_shipped_split():
     source = open_source("synthetic")
-    drawn = fresh.draw(source, load_split("synthetic", "test"), 0, Engine(1024, 2), rows=5)
+    drawn = fresh.draw("synthetic", "test", 0, Engine(1024, 2), rows=5)
     assert [episode.score for _, episode in rollout(ExpertAgent(), source, drawn.cases)] == [20.0] * 5

@@ -13,7 +13,7 @@ from dextron_bench.leaderboard.page.rows import QUOTED, Entry
 from dextron_bench.scores import cells
 
 Links = Mapping[str, Sequence[Shown]]
-OPTIONAL = ("rank", "iqm", "regret")  # Columns that appear only if some row has them.
+OPTIONAL = ("rank", "iqm", "regret", "fresh")  # Columns that appear only if some row has them.
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,8 @@ class Column:
 
 def table(entries: Sequence[Entry], links: Links) -> Html:
     """The whole table in the order of the entries; readable without a script."""
-    columns = _columns({name for entry in entries for name in entry.scores}, links)
+    known = {name for entry in entries for name, value in entry.scores.items() if value == value}
+    columns = _columns(known, links)
     head = tag("thead", tag("tr", *(_heading(column) for column in columns)))
     body = tag("tbody", *(_row(entry, columns) for entry in entries))
     caption = "Scores of methods by source of reaches and split, with 95 % intervals. Click a heading to sort."
@@ -42,6 +43,7 @@ def _columns(names: set[str], links: Links) -> list[Column]:
         Column("method", lambda entry: entry.method.lower(), _method),
         Column("return", _score("return"), _return, True, "of 20, 95 % interval"),
         Column("success", _score("success"), _success, True, "%, 95 % interval"),
+        Column("fresh", _score("fresh"), _fresh, True, "return on fresh settings, and gap"),
         Column("IQM", _score("iqm"), _interquartile_mean, True, "interquartile mean"),
         Column(
             "regret", _score("regret"), lambda entry: cells.regret(entry.scores) or UNKNOWN, True, "against experts"
@@ -90,7 +92,8 @@ def _score(name: str) -> Callable[[Entry], Any]:
 def _method(entry: Entry) -> Html:
     mark = "quoted" if entry.tier == QUOTED else entry.role
     note = tag("small", entry.note) if entry.note else None
-    return join(tag("span", entry.method, class_="name"), tag("span", mark, class_="mark") if mark else None, note)
+    marks = [tag("span", text, class_="mark") for text in (mark, cells.mark(entry.scores)) if text]
+    return join(tag("span", entry.method, class_="name"), *marks, note)
 
 
 def _tier(entry: Entry) -> Html:
@@ -114,6 +117,14 @@ def _success(entry: Entry) -> Html:
 
 def _with_interval(score: cells.Score) -> Html:
     return join(tag("b", score.value), " ", tag("span", score.interval, class_="range") if score.interval else None)
+
+
+def _fresh(entry: Entry) -> str | Html:
+    """The mean return on fresh settings, and how much higher the return on the split is."""
+    score = cells.fresh(entry.scores)
+    if not score.value:
+        return UNKNOWN
+    return join(_with_interval(score), tag("small", f"gap {cells.gap(entry.scores)}"))
 
 
 def _interquartile_mean(entry: Entry) -> str:

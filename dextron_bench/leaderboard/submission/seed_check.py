@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from dextron_bench.evaluation import episode_table
 from dextron_bench.evaluation.episodes import Episode, fingerprint
 from dextron_bench.leaderboard.submission import bundle, episode_tables, playing, relaunch, replay_check
 from dextron_bench.leaderboard.submission.recording_check import RecordingCheck
@@ -73,6 +75,20 @@ class SeedCheck:
             differing.append(str(error))
         finding.add(*differing)
         return finding
+
+    def play_fresh(
+        self, splits: Sequence[Split], limits: Limits, trust: bool, threads: int, report: Progress
+    ) -> pd.DataFrame:
+        """The table of the agent's episodes on fresh settings; raises AgentError, BadBundle."""
+        source, rows = sources.open_source(self._manifest["reaches"]), []
+        launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, trust)
+        total = sum(len(split.cases) for split in splits)
+        for split in splits:
+            for row, episode in playing.play_shuffled(launch, source, split, self._seed, limits, threads):
+                expert = split.cases[row].expert
+                rows.append(episode_table.row(split, row, episode) | asdict(expert))
+                report(len(rows), total, f"seed {self._seed}, fresh settings")
+        return pd.DataFrame(rows).sort_values(["split", "row"], ignore_index=True)
 
     def _read(self) -> tuple[pd.DataFrame, dict[str, Any]]:
         """The table of episodes and the result; raises BadBundle, DamagedFile."""

@@ -35,7 +35,10 @@ class SeedFinding:
 
 @dataclass(slots=True)
 class Verdict:
-    """What verification finds for a submission: problems, notes, and the results computed anew, by seed."""
+    """What verification finds for a submission: problems, notes, and the results computed anew, by seed.
+
+    `tables` are the episodes as they were played again, and `fresh` the episodes on fresh settings.
+    """
 
     manifest: dict[str, Any]
     tier: str = "replayed"
@@ -44,7 +47,8 @@ class Verdict:
     problems: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     results: dict[int, dict[str, Any]] = field(default_factory=dict)
-    tables: dict[int, pd.DataFrame] = field(default_factory=dict)  # Episodes as they were played again.
+    tables: dict[int, pd.DataFrame] = field(default_factory=dict)
+    fresh: dict[int, pd.DataFrame] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:

@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.leaderboard.submission import duplicates
+from dextron_bench.leaderboard.fresh_settings import FreshSettings
+from dextron_bench.leaderboard.submission import bundle, duplicates
 from dextron_bench.leaderboard.submission.seed_check import SeedCheck
 from dextron_bench.leaderboard.submission.verdict import Verdict
+from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import sandbox
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.splits.loading import load_split, ranking_splits
@@ -29,12 +31,13 @@ def verify(
     threads: int = 0,
     limits: Limits | None = None,
     trust: bool = False,
+    fresh: FreshSettings | None = None,
     report: Progress = no_progress,
 ) -> Verdict:
     """Checks an unpacked bundle (see `bundle.unpack`) against the splits, the engine and the results on a board.
 
     With `rerun` the agent also runs again, from the files in the bundle, and in the sandbox only unless `trust` is
-    True. Raises MissingData, OSError.
+    True; then it also plays `fresh` settings, if they are given. Raises MissingData, OSError.
     """
     verdict, numbers = Verdict(manifest), manifest["seeds"]
     if manifest["physics"] != model.mjcf_hash():
@@ -50,6 +53,8 @@ def verify(
         verdict.problems.append(f"holds seed{extra[0]}, which is not among the seeds that its manifest lists")
     if rerun and verdict.passed:
         _rerun(folder, seeds, verdict, limits or Limits(), trust, threads, report)
+        if fresh is not None and verdict.passed:
+            _play_fresh(fresh, seeds, verdict, limits or Limits(), trust, threads, report)
     _check_copies(verdict, board)
     return verdict
 
@@ -84,3 +89,24 @@ def _rerun(
         verdict.notes.append("the agent ran again without a sandbox, with your rights: its tier stays `replayed`")
     elif verdict.passed:
         verdict.tier = "re-run"
+
+
+def _play_fresh(
+    fresh: FreshSettings,
+    seeds: Sequence[SeedCheck],
+    verdict: Verdict,
+    limits: Limits,
+    trust: bool,
+    threads: int,
+    report: Progress,
+) -> None:
+    """Lets the agent of each seed play fresh settings, and adds their scores to the results."""
+    splits = fresh.draw(verdict.manifest["reaches"], threads, report)
+    for seed, result in zip(seeds, verdict.results.values(), strict=True):
+        try:
+            table = seed.play_fresh(splits, limits, trust, threads, report)
+        except (AgentError, bundle.BadBundle) as error:
+            verdict.problems.append(f"on fresh settings: {error}")
+            return
+        verdict.fresh[result["seed"]] = table
+        result["fresh"] = fresh.scores(table)

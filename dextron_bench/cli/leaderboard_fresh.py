@@ -1,0 +1,60 @@
+"""`dextron-bench leaderboard fresh`: the baselines of the leaderboard play settings that nobody could know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import get_args
+
+from dextron_bench.cli.exit_codes import DONE
+from dextron_bench.cli.output import progress_bar
+from dextron_bench.reaches.sources import RankedSource
+
+
+@dataclass(frozen=True)
+class Fresh:
+    """Let the baselines of the leaderboard play fresh settings, the same for all, and build the leaderboard.
+
+    If it is interrupted, the same command continues with the rows that have not played them.
+
+    Example: dextron-bench leaderboard fresh --beacon 2026-11-22
+    """
+
+    beacon: str = ""
+    """A public value that did not exist when the baselines were trained; by default the board's, or a random one."""
+    rows: int = 0
+    """How many fresh settings of each split; 0 means as many as the split has."""
+    method: tuple[str, ...] = ()
+    """Only the rows of these methods."""
+    reaches: tuple[RankedSource, ...] = get_args(RankedSource)
+    """Only rows on these sources; `real` needs the recorded reaches."""
+    board: Path = Path("leaderboard")
+    """Folder of the leaderboard."""
+    threads: int = 0
+    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
+    quiet: bool = False
+    """Show no progress."""
+
+    def __call__(self) -> int:
+        from dextron_bench.leaderboard import build
+
+        for reaches in self.reaches:
+            self._play(reaches)
+        print(*build.build(self.board), sep="\n")
+        return DONE
+
+    def _play(self, reaches: str) -> None:
+        """Lets the baselines on one source play, one after the other."""
+        from dextron_bench.leaderboard import fresh_baselines, verify_board
+
+        rows = [row for row in verify_board.rows(self.board, self.method, [reaches]) if not row.run.episodes.exists()]
+        with progress_bar(f"fresh settings of {reaches} reaches", self.quiet) as progress:
+            fresh, splits = fresh_baselines.settings_of_board(
+                self.board, reaches, self.beacon, self.rows, self.threads, progress
+            )
+        for row in rows:
+            played = row.result.get("fresh", {}).get("splits", {})
+            if {name: one["digest"] for name, one in played.items()} != {one.name: one.digest for one in splits}:
+                with progress_bar(row.name, self.quiet) as progress:
+                    fresh_baselines.play(row.run, row.result, fresh, splits, self.threads, progress)
+            print(row.name, flush=True)

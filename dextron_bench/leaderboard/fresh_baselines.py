@@ -1,0 +1,107 @@
+"""Lets baselines on the board play fresh settings, the same for all, and verifies what rows scored on fresh ones."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from dextron_bench.evaluation import episode_table
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.leaderboard.baseline_check import agent_of, drawn_rows
+from dextron_bench.leaderboard.fresh_settings import FreshSettings, from_frame, to_frame
+from dextron_bench.leaderboard.submission import replay_check
+from dextron_bench.reaches import sources
+from dextron_bench.splits.loading import Split
+from dextron_bench.storage import atomic, schemas, tables
+from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.world import model
+
+FOLDER = "fresh"  # In the leaderboard's folder: the fresh settings of all baselines, a table for each source.
+
+
+def settings_of_board(
+    board: Path, reaches: str, beacon: str = "", rows: int = 0, threads: int = 0, report: Progress = no_progress
+) -> tuple[FreshSettings, list[Split]]:
+    """The fresh settings of a board's baselines on a source: the stored ones, or new ones if these are others.
+
+    Baselines have no bundle: the hash of the physics takes the place of its hash. Without a beacon, the stored settings
+    are right if there are some. Raises DamagedFile.
+    """
+    file = board / FOLDER / f"{reaches}.parquet"
+    about = file.with_suffix(".json")
+    stored = FreshSettings(**schemas.read(about, schemas.FRESH_SETTINGS)) if about.exists() and file.exists() else None
+    if stored is not None and beacon in ("", stored.beacon) and rows in (0, stored.rows):
+        return stored, from_frame(_read(file, tables.CASES), reaches)
+    fresh = FreshSettings(model.mjcf_hash(), beacon, rows) if beacon else FreshSettings(model.mjcf_hash(), rows=rows)
+    splits = fresh.draw(reaches, threads, report)
+    tables.write(file, to_frame(splits))
+    atomic.write_json(about, asdict(fresh))
+    return fresh, splits
+
+
+def play(
+    run: RunFolder, result: dict[str, Any], fresh: FreshSettings, splits: list[Split], threads: int, report: Progress
+) -> None:
+    """Plays fresh settings with the agent of a baseline's row, and writes the scores into its result."""
+    parts, total = [], sum(len(split.cases) for split in splits)
+    for split in splits:
+        parts.append(_episodes(run, result, split, np.arange(len(split.cases)), threads))
+        report(sum(map(len, parts)), total)
+    atomic.write_json(run.result, {**result, "fresh": fresh.scores(pd.concat(parts))})
+
+
+def problems(
+    run: RunFolder, result: dict[str, Any], board: Path, count: int, redraw: bool, threads: int, report: Progress
+) -> list[str]:
+    """How the fresh scores of a row differ from its episodes, played again; empty if they are equal.
+
+    Of a baseline, `count` rows of each split are played, 0 for all. With `redraw`, the settings are drawn again, too.
+    """
+    claimed, reaches = result["fresh"], result["reaches"]
+    if run.fresh.exists():
+        table = _read(run.fresh, tables.FRESH_EPISODES)
+        splits = from_frame(table, reaches)
+        replayed = replay_check.replay_table(sources.open_source(reaches), splits, table, threads, report)
+        stated = FreshSettings(claimed["submission"], claimed["beacon"])
+        if replayed.exact != replayed.episodes or stated.scores(replayed.rows) != claimed:
+            return ["its scores on fresh settings differ from its actions, played again", *replayed.differing]
+    else:
+        if not all((board / FOLDER / f"{reaches}{end}").exists() for end in (".json", ".parquet")):
+            return [f"its fresh settings are missing from {board / FOLDER}"]
+        stored, splits = settings_of_board(board, reaches)
+        if (stored.submission, stored.beacon) != (claimed["submission"], claimed["beacon"]):
+            return ["it played other fresh settings than the other baselines"]
+        for split in splits:
+            rows = drawn_rows(len(split.cases), count)
+            scores = _episodes(run, result, split, rows, threads)["score"].tolist()
+            known = claimed["splits"].get(split.name, {})
+            if known.get("digest") != split.digest or scores != [known["scores"][row] for row in rows]:
+                return [f"its scores on fresh settings of {split.name} differ from its episodes, run again"]
+    return list(_redrawn(claimed, reaches, splits, threads, report)) if redraw else []
+
+
+def _redrawn(claimed: dict[str, Any], reaches: str, splits: list[Split], threads: int, report: Progress) -> list[str]:
+    """A problem if the settings do not follow from the hash of the submission and the beacon."""
+    fresh = FreshSettings(claimed["submission"], claimed["beacon"], len(splits[0].cases))
+    again = {split.name: split.digest for split in fresh.draw(reaches, threads, report)}
+    differing = [split.name for split in splits if again.get(split.name) != split.digest]
+    return [f"its fresh settings of {', '.join(differing)} do not follow from its beacon"] if differing else []
+
+
+def _episodes(run: RunFolder, result: dict[str, Any], split: Split, rows: np.ndarray, threads: int) -> pd.DataFrame:
+    """The table of the episodes of a baseline on some rows of a split."""
+    source, cases = sources.open_source(split.reaches), [split.cases[row] for row in rows]
+    episodes = dict(rollout(agent_of(run, result), source, cases, threads=threads))
+    return pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
+
+
+def _read(file: Path, columns: tables.Columns) -> pd.DataFrame:
+    try:
+        return tables.read(file, columns)
+    except tables.BadTable as error:
+        raise atomic.DamagedFile(file, error) from error

@@ -1,0 +1,83 @@
+"""Baselines on a board play the same fresh settings, which are stored, and verification plays them again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dextron_bench.cli import main
+from dextron_bench.splits import fresh
+from dextron_bench.splits.loading import Split, cases_from_frame, split_digest
+from tests.helpers import tiny_benchmark
+
+METHODS = ("nothing", "reflex")
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Instead of a search: each fresh split has two solved settings; the list gets the names of the drawn splits."""
+    names: list[str] = []
+    rows = pd.DataFrame([("-", *one) for one in tiny_benchmark.SOLVED], columns=tiny_benchmark.COLUMNS)
+
+    def draw(reaches: str, name: str, seed: int, *_: object) -> Split:
+        names.append(name)
+        table = rows.assign(window=0.0, duration_noise=rows["duration_noise"] + seed % 7 / 1000)
+        return Split(name, reaches, tuple(cases_from_frame(table)), split_digest(table))
+
+    monkeypatch.setattr(fresh, "draw", draw)
+    return names
+
+
+@pytest.fixture
+def board(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A board with two baselines on a tiny benchmark."""
+    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "splits"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    for method in METHODS:
+        assert main.main(["run", "--method", method, "--no-floors", "--quiet"]) == 0
+    assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
+    yield tmp_path / "board"
+    tiny_benchmark.forget()
+
+
+def words(*more: str) -> list[str]:
+    return ["leaderboard", "fresh", "--reaches", "synthetic", "--board", "board", "--quiet", *more]
+
+
+def verification(*more: str) -> list[str]:
+    return ["leaderboard", "verify", "--all", "--board", "board", "--quiet", *more]
+
+
+def test_all_baselines_play_one_draw_and_it_is_kept(board: Path, drawn: list[str], capsys: pytest.CaptureFixture[str]):
+    assert main.main(words("--beacon", "a", "--method", "nothing")) == 0
+    assert main.main(words()) == 0  # The other method, on the settings of the board.
+    assert drawn == ["test", "unseen-reach"]
+    results = [json.loads((board / f"results/{m}/synthetic/seed0/result.json").read_text()) for m in METHODS]
+    assert {result["fresh"]["beacon"] for result in results} == {"a"}
+    assert len({json.dumps(r["fresh"]["splits"]["test"]["digest"]) for r in results}) == 1
+    table = pd.read_csv(board / "table.csv")
+    assert table["fresh"].notna().all()
+    assert "; fresh " in (board / "README.md").read_text()
+    assert main.main(words("--beacon", "b")) == 0
+    assert drawn == ["test", "unseen-reach"] * 2
+
+
+def test_fresh_scores_of_baselines_are_verified(board: Path, drawn: list[str], capsys: pytest.CaptureFixture[str]):
+    assert main.main(words("--beacon", "a")) == 0
+    assert main.main(verification("--redraw")) == 0
+    file = board / "results/reflex/synthetic/seed0/result.json"
+    right = json.loads(file.read_text())
+    wrong = json.loads(file.read_text())
+    wrong["fresh"]["splits"]["test"]["scores"] = [7.0, 7.0]
+    file.write_text(json.dumps(wrong))
+    capsys.readouterr()
+    assert main.main(verification("--method", "reflex")) == 1
+    assert "its scores on fresh settings of test differ from its episodes, run again" in capsys.readouterr().out
+    file.write_text(json.dumps(right))
+    (board / "fresh" / "synthetic.json").unlink()
+    assert main.main(verification("--method", "reflex")) == 1
+    assert "its fresh settings are missing" in capsys.readouterr().out
