@@ -111,6 +111,12 @@ STEPS: tuple[Step, ...] = (
         makes=("docs/pictures/fig*.png", "docs/pictures/h*.png"),
     ),
     Step(
+        "fresh",
+        ("leaderboard fresh",),
+        needs=(SPLITS, f"{WEIGHTS}/*/*/*.safetensors"),
+        makes=("leaderboard/fresh/*",),
+    ),
+    Step(
         "board",
         ("leaderboard build",),
         needs=("leaderboard/results/*/*/*/*.json", "recordings/*.rrd"),
