@@ -21,6 +21,16 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes 
 BESIDE = Path(__file__).parents[2] / "shared" / "data" / "dextron-a101b9e-extracts.zip"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--thorough", action="store_true", help="many more mutations and kills in slow tests")
+
+
+@pytest.fixture(scope="session")
+def thorough(request: pytest.FixtureRequest) -> bool:
+    """True if the slow tests that draw mutations and kills shall draw many more."""
+    return request.config.getoption("--thorough")
+
+
 @pytest.fixture(scope="session")
 def release() -> Path:
     """The path of the authors' release: DEXTRON_DATA, else beside the checkout. Skips the test if there is none."""

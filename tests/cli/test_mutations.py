@@ -1,7 +1,8 @@
 """Mutations of every kind of file: no code 70, no hang, and no result that changes without a word.
 
-Each mutation is made in a copy of a finished run, of an unfinished training or of a board; then the command that reads
-the file runs again. Either it ends with one line and code 2, or all files that it makes have the bytes of before.
+Each mutation is made in a copy of a finished run, an unfinished training, a search, a board, a submission or a
+recording; then the command that reads the file runs again. Either it ends with one line and code 2 (1 for a refused
+submission), or all files that it makes have the bytes of before. `pytest --thorough` makes 300 mutations of each file.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import random
 import shutil
 import signal
 import types
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -25,27 +27,29 @@ from dextron_bench.methods import weights
 from dextron_bench.training import learning_curve
 from dextron_bench.world.engine import Engine
 from tests.helpers import tiny_benchmark, tiny_training
+from tests.helpers.forged_bundles import AGENT
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.toy_learner import ToyTrainer
 
-COUNT = 20  # Mutations of each kind of file.
+COUNT, THOROUGH = 20, 300  # Mutations of each kind of file.
 LONGEST = 30  # [s] that a command may take.
 TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--no-floors", "--record", "0"]
 RUN = ["run", *TOY]
 BUILD = ["leaderboard", "build", "--runs", "runs", "--into", "board"]
 BASE = "runs/toy-0.1/synthetic"
+BUNDLE, RECORDING = "near-synthetic.zip", "runs/nothing/synthetic/seed0/recordings/test-0000.rrd"
 STRANGE: list[Any] = [None, "", "text", -1, 1e308, 10**30, float("nan"), True, [], {}, [[]], {"a": None}]
 
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path]]:
-    """A finished run with its board, an unfinished training, and a search."""
+    """A finished run with its board, an unfinished training, a search, a submission and a recording."""
     root = tmp_path_factory.mktemp("mutations")
     with pytest.MonkeyPatch.context() as patch:
         tiny_training.install(tiny_training.write(root / "data"), patch.setattr)
         patch.setattr(weights, "shipped_folder", lambda learner, reaches: root / "shipped" / learner.label / reaches)
         patch.setattr(learning_curve, "rollout", tiny_training.artificial_scores)
-        made = {name: root / name for name in ("finished", "unfinished", "search")}
+        made = {name: root / name for name in ("finished", "unfinished", "search", "submission", "recording")}
         for folder in made.values():
             folder.mkdir()
         patch.chdir(made["finished"])
@@ -55,6 +59,11 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path
             broken.setattr(ToyTrainer, "advance", advance_until_the_fifth)
             assert main.main(RUN) == 2
         montecarlo.run(SOURCE, SEARCH, made["search"], 1, Engine(12, 1))
+        patch.chdir(made["submission"])
+        Path("near.py").write_text(AGENT)
+        assert main.main(["submit", "near.py:Near", "--name", "near", "--seed", "0", "--quiet"]) == 0
+        patch.chdir(made["recording"])
+        assert main.main(["run", "--method", "nothing", "--no-floors", "--quiet", "--record", "1"]) == 0
         yield made
     tiny_benchmark.forget()
 
@@ -86,6 +95,14 @@ def search() -> int:
     return 0
 
 
+def verify() -> int:
+    return main.main(["leaderboard", "verify", BUNDLE, "--quiet"])
+
+
+def export() -> int:
+    return main.main(["recordings", "export", RECORDING, "--into", "steps.csv", "--quiet"])
+
+
 KINDS = [  # The folder, the file in it, and the command that reads the file.
     *[("finished", f"{BASE}/seed0/{name}", run) for name in ("config.json", "provenance.json", "episodes.parquet")],
     *[("finished", f"{BASE}/seed0/{name}", build) for name in ("result.json", "curve.json", "config.json")],
@@ -98,6 +115,8 @@ KINDS = [  # The folder, the file in it, and the command that reads the file.
     ],
     ("search", "search.json", search),
     ("search", "blocks/000000.parquet", search),
+    *[("submission", name, verify) for name in (BUNDLE, f"{BUNDLE}!bundle.json", f"{BUNDLE}!seed0/result.json")],
+    ("recording", RECORDING, export),
 ]
 # Another plausible value in these files is not noticed here: nothing beside them repeats the values.
 UNPROTECTED = ("result.json", "curve.json", "provenance.json", "timing.jsonl")
@@ -140,11 +159,30 @@ def outputs(folder: Path) -> dict[str, bytes]:
         name = file.relative_to(folder).as_posix()
         if file.name == "result.json" and "/training" not in name:
             files[name] = json.dumps(json.loads(file.read_text()) | {"provenance": None}).encode()
-        elif file.name in ("weights.safetensors", "curve.json", "draws.csv"):
+        elif file.name in ("weights.safetensors", "curve.json", "draws.csv", "steps.csv"):
             files[name] = file.read_bytes()
         elif file.name == "episodes.parquet":
             files[name] = pd.read_parquet(file).drop(columns=["actions", "final"]).to_csv().encode()
     return files
+
+
+def content_of(folder: Path, name: str) -> bytes:
+    """The bytes of a file; `archive!member` names a member of an archive."""
+    archive, _, member = name.partition("!")
+    return zipfile.ZipFile(folder / archive).read(member) if member else (folder / name).read_bytes()
+
+
+def put(folder: Path, name: str, content: bytes) -> None:
+    """Replaces the bytes of a file, or of a member of an archive, whose checksum is then right again."""
+    archive, _, member = name.partition("!")
+    if member:
+        with zipfile.ZipFile(folder / archive) as packed:
+            members = {one: packed.read(one) for one in packed.namelist()} | {member: content}
+        with zipfile.ZipFile(folder / archive, "w") as packed:
+            for one, bytes_of_one in members.items():
+                packed.writestr(one, bytes_of_one)
+    else:
+        (folder / name).write_bytes(content)
 
 
 def timed_out(number: int, frame: types.FrameType | None) -> None:
@@ -154,18 +192,24 @@ def timed_out(number: int, frame: types.FrameType | None) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("state", "name", "command"), KINDS, ids=[f"{s}-{n.rpartition('/')[2]}" for s, n, _ in KINDS])
 def test_a_mutation_is_named_or_changes_nothing(
-    folders: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str, name: str, command: Any
+    folders: dict[str, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    thorough: bool,
+    state: str,
+    name: str,
+    command: Any,
 ):
     rng = random.Random(f"{state} {name}")
     signal.signal(signal.SIGALRM, timed_out)
-    original, codes = (folders[state] / name).read_bytes(), []
+    original, codes = content_of(folders[state], name), []
     expected: dict[str, Any] = {}
-    for number in range(COUNT + 1):
+    for number in range((THOROUGH if thorough else COUNT) + 1):
         folder = tmp_path / str(number)
         shutil.copytree(folders[state], folder)
         monkeypatch.chdir(folder)
         content = mutated(original, name, rng) if number else original
-        (folder / name).write_bytes(content)
+        put(folder, name, content)
         signal.alarm(LONGEST)
         try:
             code = command()
@@ -176,7 +220,7 @@ def test_a_mutation_is_named_or_changes_nothing(
             assert code == 0
             expected = after
         codes.append(code)
-        assert code in (0, 2), f"mutation {number}"
+        assert code in ((0, 1, 2) if state == "submission" else (0, 2)), f"mutation {number}"
         if code == 0 and Path(name).name not in UNPROTECTED:
             assert after == expected, f"mutation {number}"
         shutil.rmtree(folder, ignore_errors=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import random
-import re
+import shutil
 import signal
 import time
 from collections.abc import Iterator
@@ -61,7 +61,10 @@ def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[st
     ],
     ids=["toy", "rlil"],
 )
-def test_a_run_that_is_killed_repeatedly_ends_like_an_uninterrupted_one(here: Path, words: list[str], latest: float):
+def test_a_run_that_is_killed_repeatedly_ends_like_an_uninterrupted_one(
+    here: Path, thorough: bool, words: list[str], latest: float
+):
+    """With `--thorough`, a hundred runs are killed, each at a random moment; a run that ended starts anew."""
 
     def start(folder: str) -> Any:
         return tiny_benchmark.start(here / "data", "run", *words, *FAST, "--no-floors", "--runs", folder)
@@ -69,9 +72,17 @@ def test_a_run_that_is_killed_repeatedly_ends_like_an_uninterrupted_one(here: Pa
     def files() -> set[Path]:
         return {file for file in (here / "broken").rglob("*") if file.is_file()}
 
+    def finish() -> None:
+        process = start("broken")
+        _, err = process.communicate(timeout=300)
+        assert (process.returncode, err) == (0, "")
+        broken = tiny_training.contents(here / "broken")
+        assert whole == {name: content for name, content in broken.items() if not name.endswith(".part")}
+
     assert start("whole").wait(timeout=300) == 0
+    whole = tiny_training.contents(here / "whole")
     kills, rng = 0, random.Random(0)
-    for _ in range(4):
+    while kills < (100 if thorough else 3):
         before, process = files(), start("broken")
         while process.poll() is None and files() <= before:
             time.sleep(0.01)
@@ -80,9 +91,7 @@ def test_a_run_that_is_killed_repeatedly_ends_like_an_uninterrupted_one(here: Pa
             process.send_signal(signal.SIGKILL)
             kills += 1
         process.communicate()
-    process = start("broken")
-    _, err = process.communicate(timeout=300)
-    assert (process.returncode, err) == (0, "")
-    assert kills >= 2  # The others ended before they were killed.
-    whole, broken = tiny_training.contents(here / "whole"), tiny_training.contents(here / "broken")
-    assert whole == {name: content for name, content in broken.items() if not re.search(r"\.part$", name)}
+        if process.returncode == 0:
+            finish()
+            shutil.rmtree(here / "broken")
+    finish()
