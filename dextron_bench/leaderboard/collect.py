@@ -12,7 +12,7 @@ from dextron_bench.methods.agents import as_agent_error
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage import atomic, provenance, schemas
+from dextron_bench.storage import atomic, hashing, provenance, schemas
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
 
@@ -46,6 +46,8 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
         if run.curve.exists():
             _copy(run.curve, copy.curve)
         if learner is not None:
+            if hashing.sha256(run.weights) != (result.get("training") or {}).get("sha256"):
+                raise atomic.DamagedFile(run.weights, "it is not the file that the result names")
             file = f"seed{result['seed']}.safetensors"
             _copy(run.weights, weights.shipped_folder(learner, result["reaches"]) / file)
         taken.append(copy.path)

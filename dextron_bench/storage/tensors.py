@@ -1,4 +1,8 @@
-"""Named arrays with metadata in one file, in the safetensors format; reading a file runs no code from it."""
+"""Named arrays with metadata in one file, in the safetensors format; reading a file runs no code from it.
+
+A file carries a digest of its metadata and one of its arrays, and reading compares them: a flipped bit has no other
+sign. Files of version 0.1 and files of others have none.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,7 @@ from dextron_bench.storage import atomic, hashing
 
 ABOUT = "about"  # The only key of a file's metadata: several keys would have no fixed order.
 DTYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
+SEAL = "seal"  # Entry of the metadata that is written and removed here: its own digest, and the arrays'.
 LENGTH = 8  # [bytes] at the start of a file that hold the length of the header.
 
 
@@ -26,9 +31,10 @@ class BadTensors(ValueError):
 
 def write(file: Path, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]) -> None:
     """Writes a file atomically; equal arrays and equal metadata `about`, JSON values, give equal bytes."""
+    sealed = {**about, SEAL: [_digest_of_about(about), digest(arrays)]}
     content = save(
         {name: np.asarray(array, order="C") for name, array in arrays.items()},
-        {ABOUT: json.dumps(about, sort_keys=True)},
+        {ABOUT: json.dumps(sealed, sort_keys=True)},
     )
     atomic.write_atomically(file, lambda part: part.write_bytes(content))
 
@@ -43,13 +49,24 @@ def read(file: Path) -> dict[str, np.ndarray]:
     """The arrays of a file, writable; raises BadTensors, OSError."""
     content = _content(file)
     try:
-        return {name: array.copy() for name, array in load(content).items()}  # Copies are writable.
+        arrays = {name: array.copy() for name, array in load(content).items()}  # Copies are writable.
     except Exception as error:  # A malicious header may raise any error.
         raise BadTensors(file, " ".join(str(error).split()) or type(error).__name__) from error
+    check(file, arrays)
+    return arrays
+
+
+def check(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Raises BadTensors if the arrays are not those that were written into a file; reads all of them."""
+    if _about_and_seal(file)[1] not in (None, digest(arrays)):
+        raise BadTensors(file, "its values differ from the digest that it carries")
 
 
 def memory_mapped(file: Path) -> dict[str, np.ndarray]:
-    """The arrays of a file, read-only and loaded from the disk when they are used; raises BadTensors, OSError."""
+    """The arrays of a file, read-only and loaded from the disk when they are used; `check` compares their digest.
+
+    Raises BadTensors, OSError.
+    """
     length, header = _header(file)
     try:
         entries = {name: entry for name, entry in json.loads(header).items() if name != "__metadata__"}
@@ -60,12 +77,25 @@ def memory_mapped(file: Path) -> dict[str, np.ndarray]:
 
 def read_about(file: Path) -> dict[str, Any]:
     """The metadata of a file, empty if it has none; raises BadTensors, OSError."""
+    return _about_and_seal(file)[0]
+
+
+def _about_and_seal(file: Path) -> tuple[dict[str, Any], Any]:
+    """The metadata of a file, and the digest of its arrays or None; raises BadTensors, OSError."""
     _, header = _header(file)
     try:
         about = json.loads(json.loads(header).get("__metadata__", {}).get(ABOUT, "{}"))
-        return about if isinstance(about, dict) else {}
+        about = about if isinstance(about, dict) else {}
+        of_about, of_arrays = about.pop(SEAL, (None, None))
     except (ValueError, AttributeError, TypeError, RecursionError) as error:
         raise BadTensors(file, "its header cannot be read") from error
+    if of_about not in (None, _digest_of_about(about)):
+        raise BadTensors(file, "its metadata differs from the digest that it carries")
+    return about, of_arrays
+
+
+def _digest_of_about(about: Mapping[str, Any]) -> str:
+    return hashing.digest(json.dumps(about, sort_keys=True).encode())
 
 
 def _header(file: Path) -> tuple[int, bytes]:

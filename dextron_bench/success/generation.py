@@ -149,7 +149,7 @@ def _play(source: Source, cases: Sequence[Case], agent: Agent, threads: int, fil
         "solved": solved,
     }
     about = {"rows": len(arrays["actions"]), "episodes": len(episodes), "solved": int(solved.sum())}
-    tensors.write(file, arrays, {**about, dataset.SHA256: tensors.digest(arrays)})
+    tensors.write(file, arrays, about)
 
 
 def _draw_setting(source: Source, names: frozenset[str], rng: np.random.Generator) -> Setting:

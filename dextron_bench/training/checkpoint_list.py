@@ -5,25 +5,11 @@ A training that continues from other files than those that it wrote would end wi
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.storage import hashing
 from dextron_bench.storage.atomic import DamagedFile
-
-SEAL = "sha256"  # Entry of a checkpoint's metadata: the digest of all other entries.
-
-
-def sealed(about: Mapping[str, Any]) -> dict[str, Any]:
-    """Metadata with a digest of itself."""
-    return {**about, SEAL: _digest(about)}
-
-
-def is_intact(about: Mapping[str, Any]) -> bool:
-    """True if the digest in metadata fits it, or if it has none, as in an earlier version."""
-    return about.get(SEAL) in (None, _digest({name: value for name, value in about.items() if name != SEAL}))
 
 
 def hashes(folder: Path, files: list[Path]) -> dict[str, str]:
@@ -42,7 +28,3 @@ def check(folder: Path, listed: Mapping[str, str], present: list[Path]) -> None:
             raise DamagedFile(folder, f"{name} is missing, and its checkpoint needs it")
         if hashing.sha256(file) != sha256:
             raise DamagedFile(folder, f"{name} has another SHA-256 than its checkpoint lists")
-
-
-def _digest(about: Mapping[str, Any]) -> str:
-    return hashing.digest(json.dumps(about, sort_keys=True).encode())

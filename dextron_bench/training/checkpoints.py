@@ -86,9 +86,7 @@ class Checkpoints:
         try:
             about = schemas.read_about(file, schemas.CHECKPOINT)
         except tensors.BadTensors as error:
-            raise self._damaged(CHECKPOINT) from error
-        if not checkpoint_list.is_intact(about):
-            raise self._damaged(f"{CHECKPOINT}: its metadata differs from the digest that it carries")
+            raise self._damaged(error) from error
         return about
 
     def save(
@@ -105,12 +103,8 @@ class Checkpoints:
         state = trainer.state()
         written = [self._journal(epoch), *(self.snapshot(epoch, seed) for seed in self.seeds)]
         self._listed |= checkpoint_list.hashes(self.folder, written)
-        whole = {
-            METRICS: hashing.digest(metric_rows.first(self.folder, self._rows(epoch))),
-            CHECKPOINT: tensors.digest(state),
-        }
-        about = {**asdict(progress), "files": self._listed | whole}
-        tensors.write(self.folder / CHECKPOINT, state, checkpoint_list.sealed(about))
+        metrics = {METRICS: hashing.digest(metric_rows.first(self.folder, self._rows(epoch)))}
+        tensors.write(self.folder / CHECKPOINT, state, {**asdict(progress), "files": self._listed | metrics})
 
     def resume(self, trainer: Trainer, device: str) -> None:
         """Restores a trainer from the last checkpoint, and removes everything that was written after it.
@@ -162,7 +156,7 @@ class Checkpoints:
             present += [self._journal(number) for number in self._journaled() if number <= epoch]
         if "files" not in about:
             return checkpoint_list.hashes(self.folder, [file for file in present if file.exists()])
-        listed = {name: about["files"][name] for name in about["files"] if name not in (METRICS, CHECKPOINT)}
+        listed = {name: about["files"][name] for name in about["files"] if name != METRICS}
         needed = {name: listed[name] for name in listed if not (finished and name.startswith(JOURNALS))}
         checkpoint_list.check(self.folder, needed, present)
         if hashing.digest(metric_rows.first(self.folder, self._rows(epoch))) != about["files"].get(METRICS):
@@ -173,8 +167,6 @@ class Checkpoints:
         """Restores a trainer from checkpoint and journals; raises DamagedFile, AgentError."""
         try:
             state = tensors.read(self.folder / CHECKPOINT)
-            if self._about().get("files", {}).get(CHECKPOINT) not in (None, tensors.digest(state)):
-                raise self._damaged(f"{CHECKPOINT} has other values than it lists")
             with as_agent_error("restore() of the trainer"):
                 trainer.restore(state, (tensors.read(self._journal(epoch)) for epoch in self._journaled()))
         except (tensors.BadTensors, AgentError) as error:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import safetensors.numpy
 
 from dextron_bench.storage import tensors
 
@@ -57,3 +58,36 @@ def test_a_damaged_file_is_named(tmp_path: Path, content: bytes, function: Calla
 def test_a_folder_is_not_a_file_of_arrays(tmp_path: Path):
     with pytest.raises(tensors.BadTensors, match="it is not a regular file"):
         tensors.read(tmp_path)
+
+
+def flipped(file: Path, part: bytes) -> None:
+    """Flips the last bit of the first appearance of a part of a file."""
+    content = bytearray(file.read_bytes())
+    content[content.index(part)] ^= 1
+    file.write_bytes(content)
+
+
+def test_a_flipped_bit_in_an_array_is_noticed(tmp_path: Path):
+    file = tmp_path / "a.safetensors"
+    tensors.write(file, ARRAYS, {"epoch": 3})
+    flipped(file, np.float32(0.5).tobytes())
+    with pytest.raises(tensors.BadTensors, match="its values differ from the digest"):
+        tensors.read(file)
+    assert tensors.read_about(file) == {"epoch": 3}
+    with pytest.raises(tensors.BadTensors, match="its values differ from the digest"):
+        tensors.check(file, tensors.memory_mapped(file))
+
+
+def test_a_flipped_bit_in_the_metadata_is_noticed(tmp_path: Path):
+    file = tmp_path / "a.safetensors"
+    tensors.write(file, ARRAYS, {"label": "bc"})
+    flipped(file, b"bc")
+    with pytest.raises(tensors.BadTensors, match="its metadata differs from the digest"):
+        tensors.read_about(file)
+
+
+def test_a_file_without_digests_is_read(tmp_path: Path):
+    file = tmp_path / "a.safetensors"
+    file.write_bytes(safetensors.numpy.save({"a": ARRAYS["b"]}, {"about": '{"label": "bc"}'}))
+    assert tensors.read(file)["a"].tolist() == [1, 2]
+    assert tensors.read_about(file) == {"label": "bc"}
