@@ -140,3 +140,12 @@ def test_a_hidden_folder_is_never_published(here: Path):
         shutil.copytree(here / SEED, here / "board/results" / name / "seed7")
     assert main.main(["leaderboard", "build", "--into", "board"]) == 0
     assert (here / "board/table.csv").read_bytes() == before
+
+
+def test_weights_with_a_flipped_bit_are_neither_used_nor_published(here: Path, complaint: Callable[..., str]):
+    file = here / SEED / "weights.safetensors"
+    content = bytearray(file.read_bytes())
+    content[-1] ^= 1
+    file.write_bytes(content)
+    assert "it is not the file that the result names" in complaint(*BUILD)
+    assert "differ from the digest that it carries" in complaint(*AGAIN)
