@@ -23,7 +23,7 @@ from tests.helpers.short_reaches import SOURCE
 
 TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--no-floors", "--record", "0"]
 SHOW, BUILD = ["leaderboard", "show"], ["leaderboard", "build", "--runs", "runs", "--into", "board"]
-RUN, AGAIN = ["run", *TOY], ["run", *TOY, "--splits", "val"]
+RUN, AGAIN = ["run", *TOY], ["run", *TOY, "--split", "val"]
 SEED = "runs/toy-0.1/synthetic/seed0"
 TRAINING = "runs/toy-0.1/synthetic/training-0"
 
