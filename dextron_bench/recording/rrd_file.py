@@ -56,7 +56,8 @@ def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint, a
             raise RuntimeError("Rerun is switched off by RERUN in the environment; unset it")
         memory = recording.memory_recording()
         recording.send_chunks(chunks)
-        content: bytes = memory.storage.concat_as_bytes(_encoded_blueprint(blueprint, application))
+        # The layout comes first: the web viewer lays out what it has, and would not change it for a later one.
+        content: bytes = _encoded_blueprint(blueprint, application).concat_as_bytes(memory.storage)
         memory.drain_as_bytes()  # Rerun warns about chunks that stay in memory.
         recording.disconnect()
     finally:
