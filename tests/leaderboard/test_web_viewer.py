@@ -26,7 +26,7 @@ DARK = 60  # Brightness below which a pixel belongs to the dark background of th
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[leaderboard_server.Server]:
-    """A server with Rerun's viewer and a recording of 0.6 MB: a small one opens well with its layout at the end, too."""
+    """A server with Rerun's viewer and a recording of 0.6 MB: a small one opens well in either order."""
     case = Case(SETTINGS[0], Expert(1.4, 0.2), 0.1)
     [(_, episode)] = rollout(ExpertAgent(), SOURCE, [case], threads=1)
     for folder in ("board", "recordings"):
