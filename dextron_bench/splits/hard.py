@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import montecarlo, policies
+from dextron_bench.experts import policies
 from dextron_bench.reaches import reach, rotation, setting
-from dextron_bench.splits.near_equal import without_near_equal
+from dextron_bench.splits.near_equal import SETTING, without_near_equal
 from dextron_bench.splits.scanning import RANGE, Scanner, best_critical, success_window
 from dextron_bench.world import task
 
@@ -18,7 +18,10 @@ WINDOW = 0.08  # Largest window of a row.
 RULE_SHARE = 0.5  # Largest share of the rows that the rule of thumb solves.
 FULL_SPEED = 1e6  # A gain so large that an expert only opens and closes at full speed.
 DISTANCES = np.arange(10, 21) * 0.005  # [m] from the bottle; the rule takes the best.
-BLOCK = 512  # Settings that are drawn together.
+APART = (
+    0.01  # [m] largest distance in x and in y between the offset of a row and of the setting near which it is drawn.
+)
+BLOCK = 256  # Settings that are drawn together.
 
 
 def draw(
@@ -31,13 +34,16 @@ def draw(
     coarse: int,
     fine: int,
 ) -> pd.DataFrame:
-    """`count` new settings on the reaches of `train`, with gain, best d_c and a window of at most WINDOW.
+    """`count` new settings near settings of `train` that the rule fails, with gain, best d_c and window.
 
-    The rule that closes at `distance` [m] solves at most RULE_SHARE of the rows. No setting is near-equal to one of
-    `train` or `held_out`. A scan of `coarse` points sorts out most draws, and one of `fine` points decides.
+    Windows are at most WINDOW. The rule closes at `distance` [m], and solves at most RULE_SHARE of the rows. No setting
+    is near-equal to one of `train` or `held_out`. A scan of `coarse` points sorts out most draws, and one of `fine`
+    points decides.
     """
+    settings = train.drop_duplicates(SETTING)
+    failed = settings[rule_scores(scanner, settings, np.array([distance]))[:, 0] < task.SUCCESS]
     hard, by_rule = pd.DataFrame(), 0
-    blocks = _narrow(scanner, train, seed, coarse, fine)
+    blocks = _narrow(scanner, failed, seed, coarse, fine)
     while len(hard) < count:
         narrow = next(blocks)
         rows = without_near_equal(without_near_equal(narrow, train), held_out)
@@ -48,10 +54,10 @@ def draw(
     return hard.head(count)
 
 
-def _narrow(scanner: Scanner, train: pd.DataFrame, seed: int, coarse: int, fine: int) -> Iterator[pd.DataFrame]:
+def _narrow(scanner: Scanner, settings: pd.DataFrame, seed: int, coarse: int, fine: int) -> Iterator[pd.DataFrame]:
     """The settings of one block of draws after the other, without end, that have a narrow window."""
     for number in itertools.count():
-        draws = _draw_block(scanner.source, train, np.random.default_rng([seed, number, 5]))
+        draws = _draw_block(settings, np.random.default_rng([seed, number, 5]))
         points = (scanner.scan(draws, coarse) == task.SUCCESS).sum(axis=1)
         likely = draws[(points > 0) & (points <= np.ceil(WINDOW / RANGE * coarse))]
         scores = scanner.scan(likely, fine)
@@ -60,11 +66,12 @@ def _narrow(scanner: Scanner, train: pd.DataFrame, seed: int, coarse: int, fine:
         yield measured[(windows > 0) & (windows <= WINDOW)]
 
 
-def _draw_block(source: setting.Source, train: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
-    """BLOCK settings, each on the reach of a random row of `train`, with uniform gains."""
-    reaches = rng.choice(train["reach"].to_numpy(), BLOCK)
-    settings = [montecarlo.OfReaches(source, frozenset([str(name)])).sample(rng) for name in reaches]
-    return setting.to_frame(settings).assign(gain=rng.uniform(*policies.GAIN, BLOCK))
+def _draw_block(settings: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """BLOCK settings, each near a random one of `settings`: other offsets, an equal duration noise, a new gain."""
+    rows = settings.iloc[rng.integers(len(settings), size=BLOCK)][SETTING].reset_index(drop=True)
+    for name in ("offset_x", "offset_y"):
+        rows[name] = (rows[name] + rng.uniform(-APART, APART, BLOCK)).clip(-setting.OFFSET, setting.OFFSET)
+    return rows.assign(gain=rng.uniform(*policies.GAIN, BLOCK))
 
 
 def best_distance(scanner: Scanner, rows: pd.DataFrame) -> float:

@@ -17,15 +17,14 @@ COUNT = 40
 class MadeUp(Scanner):
     """Plays nothing: windows and the successes of the rule follow from a setting's offsets.
 
-    A window is as wide as 2.5 times |offset_x|, from 0 to 0.15, around d_c = 0.3. The rule solves a setting if
-    offset_y is above -0.03, which is true for three quarters of them.
+    A window is as wide as 2.5 times |offset_x| around d_c = 0.3. The rule solves a setting if offset_y is above 0.
     """
 
     def play(self, rows: pd.DataFrame, criticals: np.ndarray) -> np.ndarray:
         offset_x, offset_y = (rows[name].to_numpy()[:, None] for name in ("offset_x", "offset_y"))
         solved = np.abs(criticals - 0.3) < 1.25 * np.abs(offset_x)
         if (rows["gain"] == hard.FULL_SPEED).all():
-            solved = np.broadcast_to(offset_y > -0.03, criticals.shape)
+            solved = np.broadcast_to(offset_y > 0.0, criticals.shape)
         return np.where(solved, 20.0, 0.0)
 
 
@@ -34,7 +33,7 @@ def scanner() -> Scanner:
     return MadeUp(SOURCE, None)  # type: ignore[arg-type]
 
 
-TRAIN = pd.DataFrame([[NAMES[0], 0.0, 0.0, 0.0]] * 3, columns=SETTING)
+TRAIN = pd.DataFrame([[NAMES[0], 0.03, -0.005, 0.3], [NAMES[0], 0.03, 0.03, 0.7]], columns=SETTING).assign(gain=1.2)
 
 
 @pytest.fixture(scope="module")
@@ -49,15 +48,26 @@ def test_windows_are_narrow_and_the_expert_is_in_their_middle(rows):
     np.testing.assert_allclose(rows["critical"], 0.3, atol=0.89 / 64)
 
 
-def test_the_rule_solves_half_and_no_more(rows):
-    """It solves three quarters of the draws, so the limit of a half is reached."""
-    assert (rows["offset_y"] > -0.03).sum() == COUNT // 2
+def test_rows_lie_near_settings_of_train_that_the_rule_fails(rows):
+    """It fails the first of the two settings only."""
+    assert (rows["duration_noise"] == 0.3).all()
+    assert rows["offset_x"].between(0.02, 0.04).all()
+    assert rows["offset_y"].between(-0.015, 0.005).all()
+    assert rows["gain"].nunique() == COUNT
 
 
-def test_reaches_are_drawn_as_often_as_they_occur_in_train(scanner):
-    train = TRAIN.assign(reach=[NAMES[0], NAMES[-1], NAMES[-1]])
-    drawn = hard.draw(scanner, train, TRAIN.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
-    assert set(drawn["reach"]) == {NAMES[0], NAMES[-1]}
+def test_the_rule_solves_half_and_no_more(scanner):
+    """Near this setting it solves three quarters of the draws, so the limit of a half is reached."""
+    train = TRAIN.head(1).assign(offset_y=-1e-9)
+    train["offset_y"] = -0.0
+    drawn = hard.draw(scanner, train, train.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
+    assert (drawn["offset_y"] > 0.0).sum() == COUNT // 2
+
+
+def test_offsets_stay_within_the_range_of_all_settings(scanner):
+    train = TRAIN.head(1).assign(offset_y=-0.059)
+    drawn = hard.draw(scanner, train, train.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
+    assert drawn["offset_y"].min() == -0.06
 
 
 def test_equal_seeds_draw_equal_rows_and_near_equal_settings_are_left_out(scanner, rows):
