@@ -18,9 +18,7 @@ WINDOW = 0.08  # Largest window of a row.
 RULE_SHARE = 0.5  # Largest share of the rows that the rule of thumb solves.
 FULL_SPEED = 1e6  # A gain so large that an expert only opens and closes at full speed.
 DISTANCES = np.arange(10, 21) * 0.005  # [m] from the bottle; the rule takes the best.
-APART = (
-    0.01  # [m] largest distance in x and in y between the offset of a row and of the setting near which it is drawn.
-)
+APART = 0.01  # [m] largest distance, in x and in y, from the offset of the setting near which a row is drawn.
 BLOCK = 256  # Settings that are drawn together.
 
 
