@@ -28,7 +28,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture(scope="session")
 def thorough(request: pytest.FixtureRequest) -> bool:
     """True if the slow tests that draw mutations and kills shall draw many more."""
-    return request.config.getoption("--thorough")
+    return bool(request.config.getoption("--thorough"))
 
 
 @pytest.fixture(scope="session")

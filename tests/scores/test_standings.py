@@ -133,8 +133,9 @@ def test_a_gap_beyond_noise_marks_a_row_and_ranks_it_by_its_fresh_scores():
     assert rows["method"].tolist() == ["honest", "memory"]
     assert rows["marked"].tolist() == [False, True]
     assert rows["rank"].tolist() == [1, 2]
-    assert rows.loc[1, ["return", "fresh", "gap"]].tolist() == [20.0, 3.0, 17.0]
-    assert rows.loc[1, "gap_low"] < 17.0 < rows.loc[1, "gap_high"]
+    marked = rows.to_dict("records")[1]
+    assert (marked["return"], marked["fresh"], marked["gap"]) == (20.0, 3.0, 17.0)
+    assert marked["gap_low"] < 17.0 < marked["gap_high"]
 
 
 def test_fresh_scores_count_only_if_every_seed_has_them_on_equal_settings():
