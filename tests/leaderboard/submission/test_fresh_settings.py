@@ -143,8 +143,10 @@ class Memory:
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def here(tmp_path_factory: pytest.TempPathFactory, thorough: bool) -> Iterator[Path]:
     """A split of solved settings, and a file with an agent that knows their first states and experts."""
+    if not thorough:
+        pytest.skip("drawing real settings takes minutes: --thorough")
     folder, engine = tmp_path_factory.mktemp("fresh"), Engine(1024, 2)
     known = fresh.solved(SOURCE, frozenset("ab"), KNOWN, 99, engine)
     cases = cases_from_frame(known)
