@@ -22,7 +22,11 @@ BESIDE = Path(__file__).parents[2] / "shared" / "data" / "dextron-a101b9e-extrac
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--thorough", action="store_true", help="slow tests with many more mutations and kills, and with real fresh settings")
+    parser.addoption(
+        "--thorough",
+        action="store_true",
+        help="slow tests with many more mutations and kills, and with real fresh settings",
+    )
 
 
 @pytest.fixture(scope="session")
