@@ -64,25 +64,43 @@ def problems(
     """
     claimed, reaches = result["fresh"], result["reaches"]
     if run.fresh.exists():
-        table = _read(run.fresh, tables.FRESH_EPISODES)
-        splits = from_frame(table, reaches)
-        replayed = replay_check.replay_table(sources.open_source(reaches), splits, table, threads, report)
-        stated = FreshSettings(claimed["submission"], claimed["beacon"])
-        if replayed.exact != replayed.episodes or stated.scores(replayed.rows) != claimed:
-            return ["its scores on fresh settings differ from its actions, played again", *replayed.differing]
+        splits = from_frame(_read(run.fresh, tables.FRESH_EPISODES), reaches)
+        faults = _faults_of_submission(run, claimed, splits, threads, report)
+    elif not all((board / FOLDER / f"{reaches}{end}").exists() for end in (".json", ".parquet")):
+        return [f"its fresh settings are missing from {board / FOLDER}"]
     else:
-        if not all((board / FOLDER / f"{reaches}{end}").exists() for end in (".json", ".parquet")):
-            return [f"its fresh settings are missing from {board / FOLDER}"]
         stored, splits = settings_of_board(board, reaches)
         if (stored.submission, stored.beacon) != (claimed["submission"], claimed["beacon"]):
             return ["it played other fresh settings than the other baselines"]
-        for split in splits:
-            rows = drawn_rows(len(split.cases), count)
-            scores = _episodes(run, result, split, rows, threads)["score"].tolist()
-            known = claimed["splits"].get(split.name, {})
-            if known.get("digest") != split.digest or scores != [known["scores"][row] for row in rows]:
-                return [f"its scores on fresh settings of {split.name} differ from its episodes, run again"]
-    return list(_redrawn(claimed, reaches, splits, threads, report)) if redraw else []
+        faults = _faults_of_baseline(run, result, splits, count, threads)
+    return faults or (_redrawn(claimed, reaches, splits, threads, report) if redraw else [])
+
+
+def _faults_of_submission(
+    run: RunFolder, claimed: dict[str, Any], splits: list[Split], threads: int, report: Progress
+) -> list[str]:
+    """How the fresh scores of a submission's row differ from its actions, played again."""
+    table = _read(run.fresh, tables.FRESH_EPISODES)
+    source = sources.open_source(splits[0].reaches)
+    replayed = replay_check.replay_table(source, splits, table, threads, report)
+    stated = FreshSettings(claimed["submission"], claimed["beacon"])
+    if replayed.exact == replayed.episodes and stated.scores(replayed.rows) == claimed:
+        return []
+    return ["its scores on fresh settings differ from its actions, played again", *replayed.differing]
+
+
+def _faults_of_baseline(
+    run: RunFolder, result: dict[str, Any], splits: list[Split], count: int, threads: int
+) -> list[str]:
+    """How the fresh scores of a baseline's row differ from those of its agent, run again."""
+    for split in splits:
+        known = result["fresh"]["splits"].get(split.name, {"digest": "", "scores": []})
+        if known["digest"] != split.digest or len(known["scores"]) != len(split.cases):
+            return [f"it has no scores for every fresh setting of {split.name}"]
+        rows = drawn_rows(len(split.cases), count)
+        if _episodes(run, result, split, rows, threads)["score"].tolist() != [known["scores"][row] for row in rows]:
+            return [f"its scores on fresh settings of {split.name} differ from its episodes, run again"]
+    return []
 
 
 def _redrawn(claimed: dict[str, Any], reaches: str, splits: list[Split], threads: int, report: Progress) -> list[str]:
