@@ -92,7 +92,7 @@ def _faults_of_submission(
 def _faults_of_baseline(
     run: RunFolder, result: dict[str, Any], splits: list[Split], count: int, threads: int
 ) -> list[str]:
-    """How the fresh scores of a baseline's row differ from those of its agent, run again."""
+    """How the fresh scores of a baseline's row differ from the scores of its agent, run again."""
     for split in splits:
         known = result["fresh"]["splits"].get(split.name, {"digest": "", "scores": []})
         if known["digest"] != split.digest or len(known["scores"]) != len(split.cases):
