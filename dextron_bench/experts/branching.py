@@ -1,9 +1,8 @@
 """Plays many experts on one setting in little more time than one expert takes.
 
-Experts of equal gain act equally until the first of them closes. So they share one episode, in which the hand opens.
-The shared episode is forked each time the hand comes within the critical distance of another expert. If the bottle
-falls in the shared episode, all experts that have not closed fail at once. The outcomes are bit-equal to the outcomes
-of the same experts played one by one.
+Experts of equal gain act equally as long as all of them close, or all of them open. So they share one episode, which
+is forked when the hand comes within the critical distance of some of them only. The outcomes are bit-equal to the
+outcomes of the same experts played one by one.
 """
 
 from __future__ import annotations
@@ -45,10 +44,10 @@ def play(engine: Engine, batches: Iterable[ExpertBatch]) -> Iterator[tuple[int, 
 
 
 class _BranchingRollout:
-    """The current episodes: one shared episode per batch, and one episode per expert that has closed.
+    """The current episodes. Each is shared by experts of one batch that have acted equally until now.
 
-    Experts are ranked by critical distance, the largest first. `_expert` is the rank of a slot's expert; in a
-    shared episode, it is the rank of the next expert to close. Free slots are reserved for all forks to come.
+    Experts are ranked by critical distance, the largest first; a slot plays the ranks from `_low` to `_high`, and
+    `_largest` and `_smallest` are their critical distances. Free slots are reserved for all forks to come.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -57,15 +56,12 @@ class _BranchingRollout:
         self._free = list(range(n))[::-1]
         self._reserved = 0
         self._live = np.zeros(0, int)
-        self._number = np.zeros(n, int)
-        self._expert = np.zeros(n, int)
-        self._is_shared = np.zeros(n, bool)
-        self._gain, self._critical, self._first, self._return = np.zeros((4, n))
-        self._length = np.zeros(n, int)
-        state = (self._number, self._expert, self._gain, self._critical, self._first, self._return, self._length)
-        self._per_slot = state  # What a fork copies.
-        self._batches: dict[int, ExpertBatch] = {}
+        self._number, self._low, self._high, self._length = np.zeros((4, n), int)
+        self._gain, self._first, self._return, self._largest, self._smallest = np.zeros((5, n))
+        shared = (self._number, self._low, self._high, self._length, self._gain, self._first, self._return)
+        self._per_slot = (*shared, self._largest, self._smallest)  # What a fork copies.
         self._ranks: dict[int, np.ndarray] = {}
+        self._criticals: dict[int, np.ndarray] = {}  # By rank.
         self._outcomes: dict[int, Outcomes] = {}
         self._unfinished: dict[int, int] = {}
 
@@ -88,24 +84,30 @@ class _BranchingRollout:
         state = self._engine.begin(np.array([slot]), [batch.path])
         self._live = np.append(self._live, slot)
         self._reserved += count - 1
-        self._batches[number] = batch
-        self._ranks[number] = np.argsort(-batch.criticals, kind="stable")
+        ranks = np.argsort(-batch.criticals, kind="stable")
+        self._ranks[number], self._criticals[number] = ranks, batch.criticals[ranks]
         self._outcomes[number] = Outcomes(np.zeros(count), np.zeros(count, int))
         self._unfinished[number] = count
-        self._number[slot], self._is_shared[slot], self._expert[slot] = number, True, 0
-        self._gain[slot], self._critical[slot] = batch.gain, batch.criticals.max()
-        self._first[slot] = task.distance(state)[0]
+        self._number[slot], self._gain[slot], self._first[slot] = number, batch.gain, task.distance(state)[0]
         self._return[slot] = self._length[slot] = 0
+        self._set_ranks(slot, 0, count)
+
+    def _set_ranks(self, slot: int, low: int, high: int) -> None:
+        """Lets a slot play the experts with ranks from `low` to `high` of its batch."""
+        criticals = self._criticals[self._number[slot]]
+        self._low[slot], self._high[slot] = low, high
+        self._largest[slot], self._smallest[slot] = criticals[low], criticals[high - 1]
 
     def _step(self) -> list[tuple[int, Outcomes]]:
-        states = self._engine.states(self._live)
-        started = self._length[self._live] > 0
-        within = self._is_closing(self._live, task.distance(states))
-        for slot in self._live[within & started & self._is_shared[self._live]]:
-            self._fork(slot)
+        live = self._live
+        distances = task.distance(self._engine.states(live))
+        some = policies.is_closing(distances, self._first[live], self._largest[live])
+        every = policies.is_closing(distances, self._first[live], self._smallest[live])
+        for k in np.flatnonzero(some & ~every & (self._length[live] > 0)):
+            self._fork(int(live[k]), distances[k])
         live = self._live
         states = self._engine.states(live)
-        closing = self._is_closing(live, task.distance(states)) & ~self._is_shared[live]
+        closing = policies.is_closing(task.distance(states), self._first[live], self._largest[live])
         actions = policies.closing_speeds(task.closure(states), closing, self._gain[live])
         actions[self._length[live] == 0] = 0.0
         step = self._engine.step(live, actions)
@@ -114,39 +116,31 @@ class _BranchingRollout:
         self._live = live[~step.ended]
         return [finished for slot in live[step.ended] for finished in self._finish(slot)]
 
-    def _is_closing(self, slots: np.ndarray, distances: np.ndarray) -> np.ndarray:
-        return policies.is_closing(distances, self._first[slots], self._critical[slots])
-
-    def _fork(self, slot: int) -> None:
-        """Forks a shared episode for each expert that closes now; the last expert keeps the slot."""
-        number = self._number[slot]
-        batch, ranks = self._batches[number], self._ranks[number]
-        distance = task.distance(self._engine.states(np.array([slot])))
-        while self._is_closing(np.array([slot]), distance)[0]:
-            if self._expert[slot] == len(ranks) - 1:
-                self._is_shared[slot] = False
-                return
-            branch = self._free.pop()
-            self._reserved -= 1
-            self._engine.fork(np.array([slot]), np.array([branch]))
-            for per_slot in self._per_slot:
-                per_slot[branch] = per_slot[slot]
-            self._is_shared[branch] = False
-            self._live = np.append(self._live, branch)
-            self._expert[slot] += 1
-            self._critical[slot] = batch.criticals[ranks[self._expert[slot]]]
+    def _fork(self, slot: int, distance: float) -> None:
+        """Forks an episode: the experts that close at this distance [m] go on in a slot of their own."""
+        low, high = int(self._low[slot]), int(self._high[slot])
+        criticals = self._criticals[self._number[slot]][low:high]
+        middle = low + int(policies.is_closing(distance, self._first[slot], criticals).sum())
+        branch = self._free.pop()
+        self._reserved -= 1
+        self._engine.fork(np.array([slot]), np.array([branch]))
+        for per_slot in self._per_slot:
+            per_slot[branch] = per_slot[slot]
+        self._live = np.append(self._live, branch)
+        self._set_ranks(branch, low, middle)
+        self._set_ranks(slot, middle, high)
 
     def _finish(self, slot: int) -> list[tuple[int, Outcomes]]:
-        """Stores the end of an episode: of one expert, or of all experts of a shared episode that have not closed."""
-        number, rank = self._number[slot], self._expert[slot]
-        ranks, outcomes = self._ranks[number], self._outcomes[number]
-        ended = ranks[rank:] if self._is_shared[slot] else ranks[rank : rank + 1]
+        """Stores the end of an episode for the experts that share it; the batch's outcomes if they were the last."""
+        number = int(self._number[slot])
+        ended = self._ranks[number][self._low[slot] : self._high[slot]]
+        outcomes = self._outcomes[number]
         outcomes.returns[ended], outcomes.lengths[ended] = self._return[slot], self._length[slot]
         self._reserved -= len(ended) - 1
         self._free.append(slot)
         self._unfinished[number] -= len(ended)
         if self._unfinished[number]:
             return []
-        for per_batch in (self._batches, self._ranks, self._outcomes, self._unfinished):
+        for per_batch in (self._ranks, self._criticals, self._outcomes, self._unfinished):
             del per_batch[number]
-        return [(int(number), outcomes)]
+        return [(number, outcomes)]

@@ -7,8 +7,6 @@ continue, on any number of threads, and finds the same rows.
 from __future__ import annotations
 
 import itertools
-from collections import deque
-from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Protocol
@@ -16,7 +14,7 @@ from typing import Protocol
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import blocks, branching, policies
+from dextron_bench.experts import blocks, outcomes, policies
 from dextron_bench.reaches import setting
 from dextron_bench.storage import folder_config
 from dextron_bench.storage.progress import Progress, no_progress
@@ -66,14 +64,6 @@ def draw(source: Sampler, search: Search, block: int) -> pd.DataFrame:
     return draws
 
 
-def batches(source: setting.Source, draws: pd.DataFrame, experts_per_setting: int) -> Iterator[branching.ExpertBatch]:
-    """One batch per setting: each `experts_per_setting` consecutive rows share one."""
-    gains, criticals = draws["gain"].to_numpy(), draws["critical"].to_numpy()
-    firsts = range(0, len(draws), experts_per_setting)
-    for i, case in zip(firsts, setting.from_frame(draws.iloc[::experts_per_setting]), strict=True):
-        yield branching.ExpertBatch(source.path(case), gains[i], criticals[i : i + experts_per_setting])
-
-
 @dataclass(frozen=True, slots=True)
 class Share:
     """The blocks that one of several processes searches: `index`, `index` + `of`, `index` + 2 `of`, ..."""
@@ -116,7 +106,7 @@ def run(
     share = share or Share()
     missing = (number for number in itertools.count(share.index, share.of) if number not in stored)
     drawn = ((number, draw(source, search, number)) for number in missing)
-    new_blocks = play_blocks(source, engine, drawn, search.experts)
+    new_blocks = outcomes.play_blocks(source, engine, drawn, search.experts)
     while (last := blocks.last_block_needed(done, rows)) is None:
         blocks.write(folder, *next(new_blocks))
         done = blocks.update_tallies(folder, done)
@@ -154,56 +144,3 @@ def restore(source: setting.Source, search: Search, folder: Path, kept: pd.DataF
         raise folder_config.FolderMismatch(
             f"row {restored} of the database does not belong to a search with seed {search.seed}"
         )
-
-
-def play_blocks(
-    source: setting.Source, engine: Engine, drawn: Iterable[tuple[int, pd.DataFrame]], experts: int
-) -> Iterator[tuple[int, pd.DataFrame]]:
-    """Plays numbered blocks of draws; yields each with its outcomes, in their order, while the next are under way.
-
-    Each `experts` consecutive draws share setting and gain. The outcomes are the columns `score` (sum of rewards) and
-    `length` [control steps].
-    """
-    unfinished: deque[_Block] = deque()
-    started: dict[int, tuple[_Block, int]] = {}  # By number of the batch: its block, and its first row in it.
-    numbers = itertools.count()
-
-    def all_batches() -> Iterator[branching.ExpertBatch]:
-        for number, draws in drawn:
-            block = _Block(number, draws, np.zeros(len(draws)), np.zeros(len(draws), int), len(draws) // experts)
-            unfinished.append(block)
-            for k, batch in enumerate(batches(source, draws, experts)):
-                started[next(numbers)] = block, k * experts
-                yield batch
-
-    for number, outcomes in branching.play(engine, all_batches()):
-        block, first = started.pop(number)
-        rows = slice(first, first + experts)
-        block.scores[rows], block.lengths[rows] = outcomes.returns, outcomes.lengths
-        block.left -= 1
-        while unfinished and not unfinished[0].left:
-            block = unfinished.popleft()
-            yield block.number, block.draws.assign(score=block.scores, length=block.lengths)
-
-
-@dataclass(frozen=True, slots=True)
-class OfReaches:
-    """A source's distribution of settings, on some of its reaches only."""
-
-    source: setting.Source
-    reaches: frozenset[str]
-
-    def sample(self, rng: np.random.Generator) -> setting.Setting:
-        """Draws settings until one is on these reaches."""
-        return next(one for one in map(self.source.sample, itertools.repeat(rng)) if one.reach in self.reaches)
-
-
-@dataclass(slots=True)
-class _Block:
-    """A block that is being played; `left` settings have no outcomes yet."""
-
-    number: int
-    draws: pd.DataFrame
-    scores: np.ndarray
-    lengths: np.ndarray
-    left: int

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import montecarlo
+from dextron_bench.experts import montecarlo, outcomes
 from dextron_bench.experts.policies import Case
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.sources import open_source
@@ -82,12 +83,24 @@ def _solved_blocks(
 ) -> Iterator[pd.DataFrame]:
     """The solved settings of one block of draws after the other, without end: a row for each setting."""
     search = montecarlo.Search(source.name, seed, block=BLOCK)
-    part = montecarlo.OfReaches(source, reaches)
+    part = _OfReaches(source, reaches)
     drawn = ((number, montecarlo.draw(part, search, number)) for number in itertools.count())
-    for number, draws in montecarlo.play_blocks(source, engine, drawn, search.experts):
+    for number, draws in outcomes.play_blocks(source, engine, drawn, search.experts):
         successful = draws[draws["score"] == task.SUCCESS]
         shuffled = successful.sample(frac=1.0, random_state=np.random.default_rng([seed, number, 4]))
         yield shuffled.drop_duplicates(SETTING).sort_index()
+
+
+@dataclass(frozen=True, slots=True)
+class _OfReaches:
+    """A source's distribution of settings, on some of its reaches only."""
+
+    source: setting.Source
+    reaches: frozenset[str]
+
+    def sample(self, rng: np.random.Generator) -> setting.Setting:
+        """Draws settings until one is on these reaches."""
+        return next(one for one in map(self.source.sample, itertools.repeat(rng)) if one.reach in self.reaches)
 
 
 def _cases(reaches: str, name: str) -> Sequence[Case]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dextron_bench.experts import blocks, montecarlo, policies
+from dextron_bench.experts import blocks, outcomes, policies
 from dextron_bench.reaches import setting
 from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.storage import tables
@@ -44,7 +44,7 @@ class Scanner:
         parts = [draws.iloc[first : first + BLOCK * points] for first in range(0, len(draws), BLOCK * points)]
         scores = [self._stored(part) for part in parts]
         missing = ((k, part) for k, part in enumerate(parts) if scores[k] is None)
-        for k, played in montecarlo.play_blocks(self.source, self.engine, missing, points):
+        for k, played in outcomes.play_blocks(self.source, self.engine, missing, points):
             scores[k] = played["score"].to_numpy()
             if self.folder is not None:
                 tables.write(self._file(parts[k]), played, compression="zstd")

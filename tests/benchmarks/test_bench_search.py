@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from dextron_bench.experts import blocks, branching, montecarlo
+from dextron_bench.experts import blocks, branching, montecarlo, outcomes
 from dextron_bench.experts.montecarlo import Search
 from dextron_bench.reaches.reach import Path
 from dextron_bench.reaches.recorded import cache
@@ -44,9 +44,9 @@ class TimedSource:
 def play_draws(source: TimedSource, draws: pd.DataFrame, experts_per_rollout: int) -> np.ndarray:
     """Returns of all draws, with `experts_per_rollout` experts branching from one rollout."""
     engine = Engine(montecarlo.SLOTS, THREADS)
-    batches = montecarlo.batches(source, draws, experts_per_rollout)  # type: ignore[arg-type]  # It needs only paths.
-    outcomes = dict(branching.play(engine, batches))
-    return np.concatenate([outcomes[number].returns for number in range(len(outcomes))])
+    batches = outcomes.batches(source, draws, experts_per_rollout)  # type: ignore[arg-type]  # It needs only paths.
+    played = dict(branching.play(engine, batches))
+    return np.concatenate([played[number].returns for number in range(len(played))])
 
 
 def test_search_with_branching(benchmark: BenchmarkFixture):

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench.experts import montecarlo
+from dextron_bench.experts import outcomes
 from dextron_bench.experts.blocks import DamagedBlock
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import MinjerkSource
@@ -43,14 +43,14 @@ def test_no_rows_have_no_scores():
 def played(tmp_path, monkeypatch) -> list[int]:
     """Two settings are stored together; the list gets the number of draws of every part that is played."""
     sizes: list[int] = []
-    original = montecarlo.play_blocks
+    original = outcomes.play_blocks
 
     def count(source, engine, drawn, experts):
         for k, part in drawn:
             sizes.append(len(part))
             yield from original(source, engine, [(k, part)], experts)
 
-    monkeypatch.setattr(montecarlo, "play_blocks", count)
+    monkeypatch.setattr(outcomes, "play_blocks", count)
     monkeypatch.setattr(scanning, "BLOCK", 2)
     return sizes
 
