@@ -13,6 +13,8 @@ from dextron_bench.cli.output import print_json, print_table
 if TYPE_CHECKING:
     import pandas as pd
 
+FRESH = ("fresh [95 %]", "gap [95 %]", "mark")  # Columns of a table in which some row has played fresh settings.
+
 
 @dataclass(frozen=True)
 class Show:
@@ -97,15 +99,18 @@ def print_rows(rows: pd.DataFrame, as_json: bool) -> None:
     columns = ["rank", "method", "return [95 %]", "success % [95 %]", "interquartile mean [95 %]", "regret"]
     for (reaches, split), group in rows.groupby(["reaches", "split"], sort=False):
         counts = ["seeds", "episodes", *(["failed"] if group["failed"].any() else [])]
+        is_fresh = "fresh" in group and bool(group["fresh"].notna().any())
         lines = [
             [
                 *(cells.rank(row), row["method"], cells.mean_return(row), cells.success(row)),
-                *(cells.interquartile_mean(row), cells.regret(row), *(row[name] for name in counts)),
+                *(cells.interquartile_mean(row), cells.regret(row)),
+                *([cells.fresh(row), cells.gap(row), cells.mark(row)] if is_fresh else []),
+                *(row[name] for name in counts),
             ]
             for row in group.to_dict("records")
         ]
         title = f"{reaches} reaches, split {split}, version {group['version'].iloc[0]}"
-        print_table(title, [*columns, *counts], lines)
+        print_table(title, [*columns, *(FRESH if is_fresh else ()), *counts], lines)
 
 
 def print_endings(rows: pd.DataFrame) -> None:

@@ -35,7 +35,7 @@ class Fresh:
 
 
 class UnevenResults(ValueError):
-    """Results on one version of a split have different numbers of rows."""
+    """Results on one version of a split have different numbers of rows, or another number than the split."""
 
 
 def table(results: Iterable[dict[str, Any]]) -> pd.DataFrame:
@@ -80,6 +80,8 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
     """The rows of a board. Of a method's numbers, only its rank depends on the other methods."""
     reaches, split, digest = key
     lengths = {len(seed["scores"]) for seeds in board.values() for seed in seeds}
+    regions = strata.start_regions(reaches, split, digest)
+    lengths |= set() if regions is None else {len(regions)}  # The split's own number of rows.
     if len(lengths) > 1:
         raise UnevenResults(
             f"results on {split} of {reaches}, version {digest[:8]}, have different numbers of rows: "
@@ -93,7 +95,6 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
     own_settings = [place for place, method in enumerate(ranked) if method in marked]
     ranked_by = [marked.get(method, scores[method]) for method in ranked]
     ranks = dict(zip(ranked, paired.ranks(ranked_by, own_settings), strict=True))
-    regions = strata.start_regions(reaches, split, digest)
     ceiling = next((scores[method].mean() for method in registry.CEILINGS if method in scores), np.nan)
     for method, returns in scores.items():
         yield {

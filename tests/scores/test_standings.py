@@ -109,6 +109,11 @@ def test_results_of_unequal_length_are_refused():
         standings.table([result("a", 0, [1.0]), result("b", 0, [1.0, 2.0])])
 
 
+def test_results_with_fewer_rows_than_the_shipped_split_are_refused():
+    with pytest.raises(standings.UnevenResults, match="have different numbers of rows: 2, 500"):
+        standings.table([result("a", 0, [1.0, 2.0], load_split("real", "test").digest)])
+
+
 def test_seeds_of_two_methods_are_drawn_independently():
     """A's seeds are 1 better than B's, but far apart. If they were drawn together, the difference would always be 1."""
     seeds = (0.0, 9.0, 18.0)

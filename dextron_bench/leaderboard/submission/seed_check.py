@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,16 @@ from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic
 from dextron_bench.storage.progress import Progress
 from dextron_bench.storage.run_folder import RunFolder
+
+
+@dataclass(frozen=True, slots=True)
+class Playing:
+    """How an agent runs again: its limits, whether it may run without a sandbox, and what hears of the progress."""
+
+    limits: Limits
+    trust: bool
+    threads: int
+    report: Progress
 
 
 class SeedCheck:
@@ -58,36 +68,34 @@ class SeedCheck:
             finding.add(f"recordings/{name} belongs to no row of the splits")
         return finding
 
-    def rerun(self, limits: Limits, trust: bool, threads: int, report: Progress) -> SeedFinding:
-        """Runs the agent again, without `trust` in the sandbox only, and compares its episodes with the replayed."""
+    def rerun(self, how: Playing) -> SeedFinding:
+        """Runs the agent again and compares its episodes with the replayed ones."""
         finding, differing = SeedFinding(self._seed), []
         source = sources.open_source(self._manifest["reaches"])
         total, done = sum(len(split.cases) for split in self._splits), 0
         try:
-            launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, trust)
+            launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, how.trust)
             for split in self._splits:
-                for row, episode in playing.play_shuffled(launch, source, split, self._seed, limits, threads):
+                for row, episode in playing.play_shuffled(launch, source, split, self._seed, how.limits, how.threads):
                     done += 1
                     if fingerprint(episode) != self._traces[split.name, row]:
                         differing.append(f"{split.name} row {row}: the agent, run again, acts differently")
-                    report(done, total, f"seed {self._seed}, running again")
+                    how.report(done, total, f"seed {self._seed}, running again")
         except (AgentError, bundle.BadBundle) as error:
             differing.append(str(error))
         finding.add(*differing)
         return finding
 
-    def play_fresh(
-        self, splits: Sequence[Split], limits: Limits, trust: bool, threads: int, report: Progress
-    ) -> pd.DataFrame:
+    def play_fresh(self, splits: Sequence[Split], how: Playing) -> pd.DataFrame:
         """The table of the agent's episodes on fresh settings; raises AgentError, BadBundle."""
         source, rows = sources.open_source(self._manifest["reaches"]), []
-        launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, trust)
+        launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, how.trust)
         total = sum(len(split.cases) for split in splits)
         for split in splits:
-            for row, episode in playing.play_shuffled(launch, source, split, self._seed, limits, threads):
+            for row, episode in playing.play_shuffled(launch, source, split, self._seed, how.limits, how.threads):
                 expert = split.cases[row].expert
                 rows.append(episode_table.row(split, row, episode) | asdict(expert))
-                report(len(rows), total, f"seed {self._seed}, fresh settings")
+                how.report(len(rows), total, f"seed {self._seed}, fresh settings")
         return pd.DataFrame(rows).sort_values(["split", "row"], ignore_index=True)
 
     def _read(self) -> tuple[pd.DataFrame, dict[str, Any]]:

@@ -12,7 +12,7 @@ from typing import Any
 
 from dextron_bench.leaderboard.fresh_settings import FreshSettings
 from dextron_bench.leaderboard.submission import bundle, duplicates
-from dextron_bench.leaderboard.submission.seed_check import SeedCheck
+from dextron_bench.leaderboard.submission.seed_check import Playing, SeedCheck
 from dextron_bench.leaderboard.submission.verdict import Verdict
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import sandbox
@@ -52,9 +52,10 @@ def verify(
     if extra := sorted({run.seed for run in seed_folders(folder)} - set(numbers)):
         verdict.problems.append(f"holds seed{extra[0]}, which is not among the seeds that its manifest lists")
     if rerun and verdict.passed:
-        _rerun(folder, seeds, verdict, limits or Limits(), trust, threads, report)
+        how = Playing(limits or Limits(), trust, threads, report)
+        _rerun(folder, seeds, verdict, how)
         if fresh is not None and verdict.passed:
-            _play_fresh(fresh, seeds, verdict, limits or Limits(), trust, threads, report)
+            _play_fresh(fresh, seeds, verdict, how)
     _check_copies(verdict, board)
     return verdict
 
@@ -68,15 +69,7 @@ def _check_copies(verdict: Verdict, board: Path | None) -> None:
         (verdict.notes if verdict.tier == "re-run" else verdict.problems).extend(copies)
 
 
-def _rerun(
-    folder: Path,
-    seeds: Sequence[SeedCheck],
-    verdict: Verdict,
-    limits: Limits,
-    trust: bool,
-    threads: int,
-    report: Progress,
-) -> None:
+def _rerun(folder: Path, seeds: Sequence[SeedCheck], verdict: Verdict, how: Playing) -> None:
     """Runs the agent of each seed again; removes its recorded episodes first, so that the agent cannot read them.
 
     Only a run in the sandbox gives the tier `re-run`: without it, the agent may read the splits and their experts.
@@ -84,27 +77,19 @@ def _rerun(
     for run in seed_folders(folder):
         shutil.rmtree(run.path)
     for seed in seeds:
-        verdict.add(seed.rerun(limits, trust, threads, report))
+        verdict.add(seed.rerun(how))
     if not sandbox.is_available():
         verdict.notes.append("the agent ran again without a sandbox, with your rights: its tier stays `replayed`")
     elif verdict.passed:
         verdict.tier = "re-run"
 
 
-def _play_fresh(
-    fresh: FreshSettings,
-    seeds: Sequence[SeedCheck],
-    verdict: Verdict,
-    limits: Limits,
-    trust: bool,
-    threads: int,
-    report: Progress,
-) -> None:
+def _play_fresh(fresh: FreshSettings, seeds: Sequence[SeedCheck], verdict: Verdict, how: Playing) -> None:
     """Lets the agent of each seed play fresh settings, and adds their scores to the results."""
-    splits = fresh.draw(verdict.manifest["reaches"], threads, report)
+    splits = fresh.draw(verdict.manifest["reaches"], how.threads, how.report)
     for seed, result in zip(seeds, verdict.results.values(), strict=True):
         try:
-            table = seed.play_fresh(splits, limits, trust, threads, report)
+            table = seed.play_fresh(splits, how)
         except (AgentError, bundle.BadBundle) as error:
             verdict.problems.append(f"on fresh settings: {error}")
             return

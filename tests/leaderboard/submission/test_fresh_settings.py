@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from dextron_bench.cli import main
 from dextron_bench.experts import policies
 from dextron_bench.leaderboard import add, fresh_settings, verify_board
 from dextron_bench.leaderboard.fresh_settings import FreshSettings
@@ -26,7 +28,7 @@ from tests.helpers.forged_bundles import Forgery
 from tests.helpers.short_reaches import SOURCE
 
 needs_sandbox = pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
-FRESH = FreshSettings("0" * 64, "a beacon", rows=40)
+FRESH = FreshSettings("0" * 64, "a beacon", rows=16)
 
 
 @pytest.fixture
@@ -59,6 +61,21 @@ def test_the_scores_on_fresh_settings_name_what_they_follow_from(added: Forgery)
     table = pd.read_csv(added.board / "table.csv").set_index(["method", "split"])
     mean = np.mean(played["splits"]["test"]["scores"])
     assert table.loc[("near", "test"), "fresh"] == pytest.approx(mean)  # Both seeds act the same.
+
+
+def test_the_terminal_shows_fresh_scores_and_the_mark(added: Forgery, capsys: pytest.CaptureFixture[str]):
+    words = ["leaderboard", "show", "--runs", str(added.board / "results")]
+    assert main.main(words) == 0
+    shown = capsys.readouterr().out
+    assert "fresh [95 %]" in shown
+    assert "not on fresh settings" not in shown
+    for file in added.board.glob("results/near/synthetic/seed*/result.json"):
+        result = json.loads(file.read_text())
+        for scores, score in ((result, 20.0), (result["fresh"], 0.0)):
+            scores["splits"]["test"]["scores"] = [score for _ in scores["splits"]["test"]["scores"]]
+        file.write_text(json.dumps(result))
+    assert main.main(words) == 0
+    assert "not on fresh settings" in capsys.readouterr().out
 
 
 def findings(board: Path, redraw: bool) -> list[str]:
@@ -100,9 +117,9 @@ def test_settings_survive_the_way_through_a_table(drawn: None):
     assert fresh_settings.from_frame(fresh_settings.to_frame(splits), "synthetic") == splits
 
 
-# Three agents on a split of twelve solved settings of two short reaches, and on forty fresh settings.
+# Agents on a split of eight solved settings of two short reaches, and on sixteen fresh settings. With `--thorough`
+# twelve and forty, and a third agent, whose gap is beyond noise on as many only.
 
-KNOWN = 12
 MEMORY = """
 import numpy as np
 from dextron_bench.world import task
@@ -145,19 +162,17 @@ class Memory:
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory, thorough: bool) -> Iterator[Path]:
     """A split of solved settings, and a file with an agent that knows their first states and experts."""
-    if not thorough:
-        pytest.skip("drawing real settings takes minutes: --thorough")
     folder, engine = tmp_path_factory.mktemp("fresh"), Engine(1024, 2)
-    known = fresh.solved(SOURCE, frozenset("ab"), KNOWN, 99, engine)
+    known = fresh.solved(SOURCE, frozenset("ab"), 12 if thorough else 8, 99, engine)
     cases = cases_from_frame(known)
-    starts = engine.begin(np.arange(KNOWN), [SOURCE.path(case.setting) for case in cases])[:, 7:10]
+    starts = engine.begin(np.arange(len(cases)), [SOURCE.path(case.setting) for case in cases])[:, 7:10]
     numbers = {"always": policies.ALWAYS_CLOSE, "closed": policies.CLOSED, "open": policies.OPEN}
     experts = [[case.expert.gain, case.expert.critical] for case in cases]
     (folder / "memory.py").write_text(MEMORY.format(starts=starts.tolist(), experts=experts, **numbers))
     (folder / "near.py").write_text(forged_bundles.AGENT)
     with pytest.MonkeyPatch.context() as patch:
         tiny_benchmark.install(tiny_benchmark.write(folder / "splits", known.assign(split="test")), patch.setattr)
-        drawn = FRESH.draw(tiny_benchmark.NAME)
+        drawn = replace(FRESH, rows=40 if thorough else 16).draw(tiny_benchmark.NAME)
         patch.setattr(FreshSettings, "draw", lambda *_: drawn)  # Once for all agents.
         yield folder
     tiny_benchmark.forget()
@@ -173,23 +188,22 @@ def verified(here: Path, name: str, spec: str, settings: dict[str, float]) -> Ve
     return verification.verify(into, manifest, rerun=True, limits=limits, fresh=FRESH)
 
 
+AGENTS = {  # By name: class, settings, and whether the row is marked.
+    "memoriser": ("memory.py:Memory", {"limit": 1e-9}, True),
+    "honest": ("near.py:Near", {"near": 0.06}, False),
+    "neighbour": ("memory.py:Memory", {"limit": 1.0}, True),
+}
+
+
 @pytest.mark.slow
 @needs_sandbox
-@pytest.mark.parametrize(
-    ("name", "spec", "settings", "is_marked"),
-    [
-        ("memoriser", "memory.py:Memory", {"limit": 1e-9}, True),
-        ("neighbour", "memory.py:Memory", {"limit": 1.0}, True),
-        ("honest", "near.py:Near", {"near": 0.06}, False),
-    ],
-)
-def test_a_memory_of_the_splits_is_marked_and_an_honest_rule_is_not(
-    here: Path, name: str, spec: str, settings: dict[str, float], is_marked: bool
-):
-    verdict = verified(here, name, spec, settings)
-    assert verdict.problems == []
-    [row] = standings.table(verdict.results.values()).to_dict("records")
-    assert row["marked"] == is_marked
-    if is_marked:
-        assert row["return"] == 20.0  # Perfect on what it knows.
-        assert row["fresh"] < 15.0
+def test_a_memory_of_the_splits_is_marked_and_an_honest_rule_is_not(here: Path, thorough: bool):
+    for name in list(AGENTS)[: 3 if thorough else 2]:
+        spec, settings, is_marked = AGENTS[name]
+        verdict = verified(here, name, spec, settings)
+        assert verdict.problems == []
+        [row] = standings.table(verdict.results.values()).to_dict("records")
+        assert row["marked"] == is_marked, name
+        if is_marked:
+            assert row["return"] == 20.0  # Perfect on what it knows.
+            assert row["fresh"] < 15.0
