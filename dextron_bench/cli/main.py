@@ -14,7 +14,7 @@ from typing import Annotated, Any, Union
 
 import tyro
 
-from dextron_bench.cli import method_flags
+from dextron_bench.cli import method_flags, usage
 from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.storage.printable import printable
@@ -107,8 +107,10 @@ def _parse_commands(commands: Mapping[str, type[Command] | Group], arguments: Se
             return tyro.cli(_union(commands), prog="dextron-bench", description=DESCRIPTION, args=arguments)
     except SystemExit as ended:
         if ended.code:
-            name = " ".join(["dextron-bench", *_command_name(commands, arguments)])
-            print(f"dextron-bench: {method_flags.one_line(message.getvalue())}; see `{name} --help`", file=sys.stderr)
+            name, command = _command_name(commands, arguments), _command(commands, arguments)
+            known = list(command) if isinstance(command, Mapping) else usage.flags(command)
+            line = usage.with_nearest(usage.one_line(message.getvalue()), known)
+            print(f"dextron-bench: {line}; see `{' '.join(['dextron-bench', *name])} --help`", file=sys.stderr)
         raise
 
 
@@ -118,6 +120,14 @@ def _command_name(commands: Mapping[str, type[Command] | Group], arguments: Sequ
         return []
     command = commands[arguments[0]]
     return [arguments[0], *(_command_name(command[1], arguments[1:]) if isinstance(command, tuple) else ())]
+
+
+def _command(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str]) -> Any:
+    """The command that the arguments start with, or the table of commands that was searched in vain."""
+    if not arguments or arguments[0] not in commands:
+        return commands
+    command = commands[arguments[0]]
+    return _command(command[1], arguments[1:]) if isinstance(command, tuple) else command
 
 
 def _union(commands: Mapping[str, type[Command] | Group]) -> Any:

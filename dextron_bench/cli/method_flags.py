@@ -6,13 +6,11 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Annotated, Any, Literal
 
 import tyro
 
 COMMANDS = ("run", "eval")  # They take the settings of a method.
-RULE = "-"  # Separates the parts of tyro's messages.
 ALL, METHOD = "--all", "--method"
 
 
@@ -56,16 +54,6 @@ def as_bad_settings(arguments: Sequence[str]) -> Iterator[None]:
         from dextron_bench.methods import registry
 
         raise registry.BadSettings(f"method {_method_spec(arguments)!r}: {' '.join(str(error).split())}") from error
-
-
-def one_line(box: str) -> str:
-    """The message in a box that tyro draws with lines or in ASCII, without its title and without help on the flag."""
-    rows = [row.strip(" │─╭╮╰╯") or RULE for row in box.replace("╮", f"\n{RULE}").splitlines() if row.strip()]
-    parts = [" ".join(part) for rule, part in groupby(rows, lambda row: not row.strip(RULE)) if not rule]
-    messages = [
-        part.rstrip(".") for part in parts[1:] if not part.startswith(("Argument helptext", "For full helptext"))
-    ]
-    return "; ".join(messages) or " ".join(box.split())
 
 
 def settings_dict(settings: Any) -> dict[str, Any]:

@@ -124,7 +124,7 @@ def test_flags_of_a_method_are_in_the_help(here: Path, capsys: pytest.CaptureFix
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--nosuch", "1"], "Unrecognized options: --nosuch"),
+        (["--nosuch", "1"], "unknown flag --nosuch"),
         (["--rate", "x"], "Error parsing --rate: could not convert string to float: 'x'; see `dextron-bench run --h"),
         (["--rate", "-1"], "--rate is -1; a learning rate is positive"),
         (
