@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -152,3 +153,25 @@ def test_the_server_serves_the_viewer_until_it_is_interrupted():
             assert process.wait(30) == 130
         finally:
             process.kill()
+
+
+def test_a_client_that_hangs_up_is_no_traceback(
+    server: leaderboard_server.Server, capfd: pytest.CaptureFixture[str], tmp_path: Path
+):
+    """The client resets its connection before it reads a large recording."""
+    (tmp_path / "recordings/large.rrd").write_bytes(bytes(30_000_000))
+    met = threading.Event()
+    original = server.handle_error
+
+    def handle_error(*connection: object) -> None:
+        original(*connection)
+        met.set()
+
+    server.handle_error = handle_error
+    client = socket.create_connection((leaderboard_server.LOOPBACK, server.server_port))
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # Resets when it is closed.
+    client.sendall(f"GET /recordings/large.rrd HTTP/1.1\r\nHost: 127.0.0.1:{server.server_port}\r\n\r\n".encode())
+    client.recv(1)
+    client.close()
+    assert met.wait(10.0)
+    assert capfd.readouterr().err == ""
