@@ -86,8 +86,11 @@ class Serve:
         return DONE
 
 
-def print_rows(rows: pd.DataFrame, as_json: bool) -> None:
-    """Prints the leaderboard's rows, a table for each source of reaches and split, or JSON."""
+def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
+    """Prints the leaderboard's rows, a table for each source of reaches and split, or JSON.
+
+    A column "from" says where a row comes from, if the rows come from several places.
+    """
     from dextron_bench.scores import cells
 
     if as_json:
@@ -98,7 +101,8 @@ def print_rows(rows: pd.DataFrame, as_json: bool) -> None:
         return
     columns = ["rank", "method", "return [95 %]", "success % [95 %]", "interquartile mean [95 %]", "regret"]
     for (reaches, split), group in rows.groupby(["reaches", "split"], sort=False):
-        counts = ["seeds", "episodes", *(["failed"] if group["failed"].any() else [])]
+        origin = ["from"] if "from" in group else []
+        counts = ["seeds", "episodes", *(["failed"] if group["failed"].any() else []), *origin]
         is_fresh = "fresh" in group and bool(group["fresh"].notna().any())
         lines = [
             [

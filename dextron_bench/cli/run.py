@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """Run a method and the floors on the splits of a source of reaches, and print the leaderboard.
+    """Run a method and the floors on the splits of a source of reaches, and print them beside the published rows.
 
     A method that learns is trained first, with all seeds together. The settings of a method are flags too:
     `dextron-bench run --method rlil --help` shows them. Nothing that a run folder already holds is computed again:
@@ -88,9 +88,15 @@ class Run:
                 results.append(result_files.read_result(run.folder(self.runs).result))
                 if run.plan.record and not self.json:
                     print(f"{folder}: results, provenance and recordings; open one with `dextron-bench view {folder}`")
+        played = {name for group in groups for name in group[0].splits}
         rows = standings.table(results)
-        rows = rows[rows["split"].isin({name for group in groups for name in group[0].splits})]
-        print_rows(rows, self.json)
+        rows = rows[rows["split"].isin(played)]
+        if self.json:
+            print_rows(rows, as_json=True)
+        else:
+            both = standings.table([*results, *result_files.published_beside(results)])
+            both["from"] = both["method"].isin(rows["method"]).map({True: "this run", False: "published"})
+            print_rows(both[both["split"].isin(played)])
         return EPISODES_FAILED if rows["failed"].any() else DONE
 
     def _estimate(self, groups: list[list[plans.Run]]) -> int:

@@ -75,6 +75,18 @@ def published_results() -> Path:
     return shipped if shipped.is_dir() else package.parent / "leaderboard" / "results"
 
 
+def published_beside(new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The published results of other methods than these, on the splits and the physics that these results have too."""
+    methods = {result["method"] for result in new}
+    physics = {result["provenance"]["physics"] for result in new}
+    digests = {split["digest"] for result in new for split in result["splits"].values()}
+    return [
+        result | {"splits": {name: split for name, split in result["splits"].items() if split["digest"] in digests}}
+        for result in results(published_results())
+        if result["method"] not in methods and result["provenance"]["physics"] in physics
+    ]
+
+
 def find(name: str, runs: Path) -> Results:
     """The results of one method: by its label in `runs`, else among the published results, else by a path.
 

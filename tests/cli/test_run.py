@@ -18,6 +18,7 @@ import pytest
 from safetensors.numpy import save_file
 
 from dextron_bench.cli import main
+from dextron_bench.runs import result_files
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 from tests.helpers import tiny_benchmark, tiny_training, toy_learner
@@ -171,6 +172,26 @@ def test_settings_that_cannot_be_flags_are_one_line(
 ):
     (here / "odd.py").write_text(ODD.format(field=field))
     assert expected in complaint("run", "--method", "odd.py:Odd", *FAST)
+
+
+def test_published_rows_of_the_same_splits_and_physics_stand_beside_the_new_ones(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    def origins() -> dict[str, str]:
+        """Where each row of the table that a run of NOTHING prints comes from, by method."""
+        capsys.readouterr()
+        assert main.main(["run", "--method", "nothing", "--no-floors", "--record", "0", "--split", "test"]) == 0
+        cells = [[cell.strip() for cell in line.split("│")] for line in capsys.readouterr().out.splitlines()]
+        return {line[2]: line[-2] for line in cells if len(line) > 4}
+
+    assert main.main(["run", "--method", "exp", "--no-floors", "--record", "0", "--runs", "board"]) == 0
+    monkeypatch.setattr(result_files, "published_results", lambda: here / "board")
+    assert origins() == {"exp": "published", "nothing": "this run"}
+    file = here / "board/exp/synthetic/seed0/result.json"
+    result = json.loads(file.read_text())
+    result["provenance"]["physics"] = "another"
+    file.write_text(json.dumps(result))
+    assert origins() == {"nothing": "this run"}
 
 
 def test_weights_of_a_file_give_the_row_of_its_run(here: Path, capsys: pytest.CaptureFixture[str]):
