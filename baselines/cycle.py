@@ -83,7 +83,7 @@ class Cycle:
 
     def weights(self) -> list[Arrays]:
         """The policy's layers, and `mean` and `deviation` of states, for each seed."""
-        layers = [parameter.detach().cpu().numpy() for parameter in self._sac.policy.parameters]
+        layers = [parameter.detach().cpu().numpy() for parameter in self._sac.policy]
         return [
             {f"policy.{i}": layer[k].copy() for i, layer in enumerate(layers)}
             | {"mean": self._states.mean[k].copy(), "deviation": self._states.deviation[k].copy()}

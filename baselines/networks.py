@@ -23,9 +23,19 @@ class Stack:
         self.parameters = list(parameters)
 
     @classmethod
-    def make(cls, inputs: int, outputs: int, rngs: Sequence[np.random.Generator], device: str = "cpu") -> Stack:
-        """New perceptrons, each drawn from its own generator; hidden layers are uniform, as in PyTorch."""
-        layers = [_layers(inputs, outputs, rng) for rng in rngs]
+    def make(
+        cls,
+        inputs: int,
+        outputs: int,
+        rngs: Sequence[np.random.Generator],
+        device: str = "cpu",
+        hidden: int = HIDDEN,
+    ) -> Stack:
+        """New perceptrons with two layers of `hidden` units, each drawn from its own generator.
+
+        Hidden layers are uniform, as in PyTorch.
+        """
+        layers = [_layers((inputs, hidden, hidden, outputs), rng) for rng in rngs]
         stacked = [np.stack(arrays).astype(np.float32) for arrays in zip(*layers, strict=True)]
         return cls([torch.tensor(array, device=device).requires_grad_() for array in stacked])
 
@@ -35,23 +45,8 @@ class Stack:
             x = torch.baddbmm(bias, x, weight).relu_()
         return torch.baddbmm(biases[-1], x, weights[-1])
 
-    def frozen(self) -> Stack:
-        """The same perceptrons; gradients pass through them but do not reach the parameters."""
-        return Stack([parameter.detach() for parameter in self.parameters])
 
-    def copy(self) -> Stack:
-        """Perceptrons with copies of the parameters, which take no gradient."""
-        return Stack([parameter.detach().clone() for parameter in self.parameters])
-
-    @torch.no_grad()
-    def average_with(self, other: Stack, rate: float) -> None:
-        """Moves the parameters towards the other's parameters by `rate` of the difference (Polyak averaging)."""
-        for parameter, target in zip(self.parameters, other.parameters, strict=True):
-            parameter.lerp_(target, rate)
-
-
-def _layers(inputs: int, outputs: int, rng: np.random.Generator) -> list[np.ndarray]:
-    sizes = (inputs, HIDDEN, HIDDEN, outputs)
+def _layers(sizes: tuple[int, int, int, int], rng: np.random.Generator) -> list[np.ndarray]:
     layers = []
     for i, (before, after) in enumerate(pairwise(sizes)):
         bound = LAST if i == len(sizes) - 2 else before**-0.5

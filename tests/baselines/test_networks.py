@@ -31,17 +31,3 @@ def test_a_perceptron_computes_the_same_alone_and_in_a_stack():
     together = stack_of(8, 9)(x)
     assert_close(together[1:], stack_of(9)(x[1:]))
     assert not torch.allclose(together[:1], stack_of(9)(x[:1]))
-
-
-def test_frozen_passes_gradients_to_the_input_only():
-    stack, x = stack_of(0), torch.ones(1, 1, 3, requires_grad=True)
-    stack.frozen()(x).sum().backward()
-    assert x.grad is not None
-    assert all(parameter.grad is None for parameter in stack.parameters)
-
-
-def test_averaging_moves_the_parameters_by_the_rate():
-    target, other = stack_of(0).copy(), stack_of(1)
-    expected = 0.75 * target.parameters[2] + 0.25 * other.parameters[2].detach()
-    target.average_with(other, 0.25)
-    assert_close(target.parameters[2], expected)

@@ -1,4 +1,4 @@
-"""Soft actor-critic: targets and losses by hand, separate gradients, and a task with a known solution."""
+"""Soft actor-critic: targets and losses by hand, gradients, and a task with a known solution."""
 
 import math
 
@@ -7,7 +7,8 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from baselines import sac
+from baselines import policy, sac
+from baselines.networks import Stack
 from baselines.sac import Batch, Sac
 
 
@@ -35,8 +36,7 @@ def test_the_value_target_subtracts_the_log_density():
     assert_close(sac.value_target(column(3.0, 3.0), column(-2.0, 0.5)), column(5.0, 2.5))
 
 
-def test_losses_by_hand():
-    assert_close(sac.squared_error(column(1.0, 5.0), column(2.0, 2.0)), torch.tensor([5.0]))
+def test_the_policys_loss_by_hand():
     actual = sac.policy_loss(column(2.0, 4.0), column(1.0, 1.0), column(1.0, 0.0), column(0.0, 2.0))
     assert_close(actual, torch.tensor([(1 - 2 + 0.001 + 1 - 4 + 0.004) / 2]))
 
@@ -44,28 +44,50 @@ def test_losses_by_hand():
 def test_with_two_critics_the_smaller_value_is_the_one_that_counts():
     """Both Q output a constant: 3 and 1; V's target and the policy's loss follow from 1, Q's losses from each."""
     learner = Sac([np.random.default_rng(0)], critics=2)
-    weight, bias = learner.action_value.parameters[-2:]
-    with torch.no_grad():
-        weight.zero_()
-        bias.copy_(torch.tensor([3.0, 1.0])[:, None, None])
-        for parameter in (*learner.target.parameters, *learner.value.parameters, *learner.policy.parameters):
-            parameter.zero_()
+    weight, bias = learner.action_value[-2:]
+    weight.zero_()
+    bias.copy_(torch.tensor([3.0, 1.0])[:, None, None])
+    for parameter in (*learner.target, *learner.value, *learner.policy):
+        parameter.zero_()
     rows = batch(np.random.default_rng(1), 1)
     rewards = torch.full_like(rows.rewards, 2.0)
-    losses = learner.losses(Batch(rows.states, rows.actions, rewards, rows.nexts, rows.alive), torch.zeros(1, 4, 1))
+    losses = learner.update(Batch(rows.states, rows.actions, rewards, rows.nexts, rows.alive), torch.zeros(1, 4, 1))
     density = -0.5 * math.log(2.0 * math.pi)  # Of the action 0 under a standard normal, squashed with slope 1.
     assert_close(losses[:, 0], torch.tensor([1.0 + 1.0, (1.0 - density) ** 2, density - 1.0]))
 
 
-@pytest.mark.parametrize(("loss", "network"), [(0, "action_value"), (1, "value"), (2, "policy")])
-def test_the_gradient_of_each_loss_reaches_only_its_network(loss, network):
-    learner = agents(0)
-    learner.losses(batch(np.random.default_rng(1), 1), torch.zeros(1, 4, 1))[loss, 0].backward()
-    reached = {
-        name: any(p.grad is not None and p.grad.any() for p in getattr(learner, name).parameters)
-        for name in ("policy", "action_value", "value")
+@pytest.mark.parametrize("critics", [1, 2])
+def test_the_gradients_by_hand_equal_automatic_ones(critics: int):
+    """Each loss is differentiated in the parameters of its own network alone."""
+    learner = Sac([np.random.default_rng(seed) for seed in (0, 1)], critics=critics)
+    rows, noise = batch(np.random.default_rng(2), 2), torch.randn(2, 4, 1, generator=torch.Generator().manual_seed(0))
+    learner.policy[-1][..., 1] = torch.tensor([-0.4, 2.5])[:, None]  # The second agent's deviation is clamped.
+    leaves = {
+        name: [parameter.clone().requires_grad_() for parameter in getattr(learner, name)]
+        for name in ("policy", "value", "action_value")
     }
-    assert reached == {name: name == network for name in reached}
+    networks = {name: Stack(parameters) for name, parameters in leaves.items()}
+
+    def q(stack: Stack, actions: torch.Tensor) -> torch.Tensor:
+        return stack(torch.cat([rows.states, actions], dim=-1).repeat(critics, 1, 1)).unflatten(0, (critics, 2))
+
+    mean, log_std = policy.head(networks["policy"](rows.states))
+    actions, log_probability = policy.sample(mean, log_std, noise)
+    smallest = q(Stack([parameter.detach() for parameter in leaves["action_value"]]), actions).amin(dim=0)
+    target = sac.action_value_target(rows.rewards, rows.alive, Stack(learner.target)(rows.nexts), sac.DISCOUNT)
+    q_loss = (q(networks["action_value"], rows.actions) - target).square().mean(dim=(-2, -1)).sum(dim=0)
+    wanted = sac.value_target(smallest, log_probability).detach()
+    v_loss = (networks["value"](rows.states) - wanted).square().mean(dim=(-2, -1))
+    losses = torch.stack([q_loss, v_loss, sac.policy_loss(smallest, log_probability, mean, log_std)])
+    losses.sum().backward()
+    assert_close(learner.differentiate(rows, noise), losses.detach())
+    layers = learner.networks.layers_of(learner.networks.gradients)
+    for part, expected in zip((slice(0, 2), slice(2, 4), slice(4, None)), leaves.values(), strict=True):
+        for layer, leaf in zip(layers, expected, strict=True):
+            assert leaf.grad is not None
+            unpadded = layer[part, : leaf.shape[1], : leaf.shape[2]]
+            assert_close(unpadded, leaf.grad)
+            assert unpadded.count_nonzero() == layer[part].count_nonzero()  # The padding has no gradient.
 
 
 def test_the_policys_gradient_goes_through_the_action():
@@ -87,16 +109,17 @@ def test_seeds_trained_together_equal_seeds_trained_alone():
         both, noise = batch(rng, 2), torch.tensor(rng.normal(size=(2, 4, 1)), dtype=torch.float32)
         together.update(both, noise)
         alone.update(Batch(*(getattr(both, name)[1:] for name in Batch.__slots__)), noise[1:])
-    for actual, expected in zip(together.trained_parameters, alone.trained_parameters, strict=True):
-        assert_close(actual[1:], expected, atol=1e-4, rtol=1e-3)
+    for name in ("policy", "action_value", "value"):
+        for actual, expected in zip(getattr(together, name), getattr(alone, name), strict=True):
+            assert_close(actual[1:], expected, atol=1e-4, rtol=1e-3)
 
 
 def test_the_target_follows_the_value_by_the_polyak_coefficient():
     learner = agents(0)
-    before = learner.target.parameters[0].clone()
+    before = learner.target[0].clone()
     learner.update(batch(np.random.default_rng(1), 1), torch.zeros(1, 4, 1))
-    expected = before + 0.01 * (learner.value.parameters[0].detach() - before)
-    assert_close(learner.target.parameters[0], expected)
+    expected = before + 0.01 * (learner.value[0] - before)
+    assert_close(learner.target[0], expected)
 
 
 def test_a_restored_learner_continues_bit_for_bit():
