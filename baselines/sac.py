@@ -152,7 +152,7 @@ class Sac:
 
 
 def policy_slope(value_slope: Tensor, outputs: Tensor, actions: Tensor, noise: Tensor) -> Tensor:
-    """B times the slope (S, B, 2) of the policy loss in its outputs (S, B, 2), for the slope of Q in the action (S, B, 1).
+    """Slope (S, B, 2) of the policy's loss in its outputs (S, B, 2), times B; takes the slope of Q in the actions.
 
     For an action tanh(u), the logarithm of the slope of tanh adds 2 tanh(u) to the slope in u.
     """
