@@ -43,8 +43,12 @@ PUBLIC = ("world.gym", "world.suite", "world.model", "world.task", "success.netw
 BASELINES_ALSO = {  # Private modules that baselines import, and why an outside entrant needs none of them.
     "methods.exact": "rounding of an output that is not a perceptron's",
     "methods.learners": "the type of named arrays",
+    "reaches.reach": "the type of a path",
+    "reaches.rotation": "features of poses; SciPy has rotations too",
+    "reaches.setting": "the type of a source",
+    "reaches.timing": "the duration of a control step",
     "reaches.sources": "names of the sources for which weights can ship",
-    "storage.atomic": "the cache of demonstrations",
+    "storage.atomic": "the caches of demonstrations and openings",
     "storage.hashing": "the cache of demonstrations, and the hash of a success model",
     "storage.tensors": "a success model in a file",
     "world.engine": "SAC trains on the batched engine; Gymnasium's vector environment offers the same",

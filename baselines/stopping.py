@@ -1,0 +1,112 @@
+"""STOPPING: learns when to close, as a problem of optimal stopping; the hand opens until then, and never reopens."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from baselines import openings, pose_features, stopping_trainer
+from baselines.normalise import CLIP
+from dextron_bench import Perceptron, Track, Trainer
+from dextron_bench.methods.exact import rounded
+from dextron_bench.world import task
+
+
+class BadNumber(ValueError):
+    """A negative number of settings."""
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """Opens, closes when small networks say so, and never reopens; learns from closings that were tried in simulation.
+
+    Training needs a simulator that can be copied: every decision of a setting of `train` is tried. An agent sees the
+    states of its episode alone.
+    """
+
+    name: ClassVar[str] = "stopping"
+    train_source: ClassVar[str] = ""
+
+    settings: int = 0
+    """Number of settings of `train` to learn from; 0 takes all."""
+
+    def __post_init__(self) -> None:
+        if self.settings < 0:
+            raise BadNumber(f"--settings is {self.settings}; give how many to learn from, or 0 for all")
+
+    @property
+    def label(self) -> str:
+        """The name, with the number of settings if it is limited."""
+        return f"{self.name}-{self.settings}" if self.settings else self.name
+
+    @property
+    def epochs(self) -> int:
+        """Number of epochs of the training."""
+        return stopping_trainer.EPOCHS
+
+    @property
+    def period(self) -> int:
+        """Epochs between checkpoints."""
+        return 3
+
+    @property
+    def timing_run(self) -> Self:
+        """The training itself, which takes minutes."""
+        return self
+
+    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+        """A trainer with several networks per seed, all trained together."""
+        played = openings.load(track)
+        count = min(self.settings or len(played), len(played))
+        decisions = stopping_trainer.Decisions(played, count, track.device)
+        return stopping_trainer.StoppingTrainer(decisions, seeds, track.device)
+
+    def policy(self, weights: Mapping[str, np.ndarray]) -> StoppingAgent:
+        """The agent that closes when the mean output of its networks is positive."""
+        return StoppingAgent(weights)
+
+
+class StoppingAgent:
+    """Opens until the mean of its networks' outputs is positive at a decision, then closes for good."""
+
+    def __init__(self, weights: Mapping[str, np.ndarray]) -> None:
+        """Takes `mean` and `deviation` (F,) of features, and layers `network.0`, ... and `ramp` of M networks."""
+        self._mean, self._deviation, self._ramp = (
+            np.asarray(weights[name], np.float64) for name in ("mean", "deviation", "ramp")
+        )
+        layers = [weights[f"network.{i}"] for i in range(6)]
+        members = [[layer[member] for layer in layers] for member in range(len(self._ramp))]
+        self._networks = [Perceptron(list(zip(one[::2], one[1::2], strict=True))) for one in members]
+        self._history = pose_features.History()
+        self._closes, self._since_near = np.zeros(0, bool), np.zeros(0, int)
+
+    def reset(self, episodes: np.ndarray) -> None:
+        """Rows `episodes` (n,) begin a new episode, with an opening hand."""
+        self._history.reset(episodes)
+        missing = max(0, int(episodes.max(initial=-1)) + 1 - len(self._closes))
+        self._closes, self._since_near = (np.pad(array, (0, missing)) for array in (self._closes, self._since_near))
+        self._closes[episodes], self._since_near[episodes] = False, -1
+
+    def act(self, states: np.ndarray) -> np.ndarray:
+        """Actions (N, 1), -1 or 1, for states (N, 48)."""
+        n = len(states)
+        self._history.add(states)
+        self._since_near[:n] += (self._since_near[:n] >= 0) | (task.distance(states) < openings.NEAR)
+        decides = (self._since_near[:n] >= 0) & (self._since_near[:n] % openings.EVERY == 0) & ~self._closes[:n]
+        rows = np.flatnonzero(decides)
+        if rows.size:
+            self._closes[rows] = self._closing(self._history.features(rows)) > 0.0
+        return np.where(self._closes[:n], 1.0, -1.0)[:, None]
+
+    def _closing(self, features: np.ndarray) -> np.ndarray:
+        """The mean logits (n,) of closing for features (n, F)."""
+        scaled = np.clip((features - self._mean) / self._deviation, -CLIP, CLIP)
+        distance = features[:, pose_features.DISTANCE]
+        logits = [
+            network(scaled)[:, 0] + steepness * (edge - distance)
+            for network, (edge, steepness) in zip(self._networks, self._ramp, strict=True)
+        ]
+        return rounded(np.mean(logits, axis=0))

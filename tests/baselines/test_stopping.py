@@ -1,0 +1,202 @@
+"""STOPPING: its features, the labels of its training, its loss by hand, and when its agent closes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+
+from baselines import openings, pose_features, stopping_trainer
+from baselines.openings import FAILS, NO_DECISION, SUCCEEDS, Openings
+from baselines.stopping import BadNumber, Stopping, StoppingAgent
+from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.methods.learners import Arrays, Track
+from dextron_bench.world import model, task
+from dextron_bench.world.engine import Engine
+from tests.helpers.short_reaches import SETTINGS, SOURCE
+
+CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
+
+
+class ClosesAt:
+    """Opens until a step, then closes at full speed."""
+
+    def __init__(self, step: int) -> None:
+        self._closing_step, self._step = step, -1
+
+    def reset(self, episodes: np.ndarray) -> None:
+        """Rows begin a new episode; all begin together."""
+        self._step = -1
+
+    def act(self, states: np.ndarray) -> np.ndarray:
+        """Actions (N, 1), -1 or 1."""
+        self._step += 1
+        return np.full((len(states), 1), 1.0 if self._step >= self._closing_step else -1.0)
+
+
+@pytest.fixture(scope="module")
+def played() -> Openings:
+    """The openings of the five short settings."""
+    return Openings(**openings.play(SOURCE, SETTINGS, threads=1))
+
+
+def test_an_outcome_is_the_end_of_an_episode_that_closes_there(played: Openings):
+    """All decisions that were tried are played again, each from its start by an agent that closes at that step."""
+    for number in (0, 1):
+        outcomes = played.outcomes[played.rows(number)]
+        steps = np.flatnonzero(outcomes != NO_DECISION)
+        tried = steps[:: openings.FIRST_TRIED]
+        scores = [dict(rollout(ClosesAt(step), SOURCE, [CASES[number]], 1, 1))[0].score for step in tried]
+        assert [score == task.SUCCESS for score in scores] == (outcomes[tried] == SUCCEEDS).tolist()
+    assert set(played.outcomes) == {NO_DECISION, FAILS, SUCCEEDS}
+
+
+def test_decisions_begin_near_the_bottle_and_come_every_second_step(played: Openings):
+    for number in range(len(played)):
+        rows = played.rows(number)
+        steps = np.flatnonzero(played.outcomes[rows] != NO_DECISION)
+        distances = task.distance(played.states[rows].astype(float))
+        assert steps[0] == np.argmax(distances < openings.NEAR)
+        assert set(np.diff(steps)) == {openings.EVERY}
+
+
+def test_decisions_between_a_success_and_a_failure_are_tried_and_others_taken_to_be_equal(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Two episodes of 8 and 5 decisions; those with the marks + succeed. Every third one is tried first."""
+    truth = np.array([char == "+" for char in "--++++-+++-++"])
+    tried: list[int] = []
+
+    def close(engine: Engine, paths: list, starts: Arrays) -> np.ndarray:
+        tried.extend(starts["row"].tolist())
+        return np.where(truth[starts["row"]], 20.0, 3.0)
+
+    monkeypatch.setattr(openings, "_close", close)
+    episode = np.repeat([0, 1], [8, 5])
+    outcomes = openings._try(None, ["a", "b"], episode, {"row": np.arange(13)})  # type: ignore[arg-type]
+    assert tried == [0, 3, 6, 8, 11, 1, 2, 4, 5, 12]
+    # Row 7 follows the failure of row 6, and nothing is tried after it; rows 9 and 10 lie between two successes.
+    assert "".join("-+"[outcome] for outcome in outcomes) == "--++++--+++++"
+
+
+def test_openings_are_kept_and_a_damaged_file_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    track = Track(SOURCE, CASES[:1] * 2, tmp_path, threads=1)
+    first = openings.load(track)
+    assert len(first) == 1  # Each setting counts once.
+    monkeypatch.setattr(openings, "play", None)
+    np.testing.assert_array_equal(openings.load(track).outcomes, first.outcomes)
+    [file] = tmp_path.iterdir()
+    file.write_bytes(file.read_bytes()[:-10])
+    with pytest.raises(Exception, match=file.name):
+        openings.load(track)
+
+
+def test_measurements_of_a_pose_by_hand():
+    """The palm looks along the world's x; its centre lies 3 cm before the bottle's axis and 2 cm to the side."""
+    states = np.zeros((1, model.STATE))
+    states[:, :25] = model.initial_qpos()
+    states[:, model.PALM_QUATERNION] = [1.0, 0.0, 0.0, 0.0]
+    states[:, model.PALM_POSITION] = 0.0
+    centre = task.palm_centre(states)[0]
+    states[:, model.BOTTLE_POSITION] = np.add(centre, [0.03, 0.02, 0.05])
+    half = np.sqrt(0.5)
+    states[:, model.BOTTLE_QUATERNION] = [half, half, 0.0, 0.0]  # Lies on its side.
+    (measured,) = pose_features.measure(states)
+    np.testing.assert_allclose(measured[pose_features.BOTTLE], [0.03, 0.02, 0.05], atol=1e-12)
+    np.testing.assert_allclose(measured[pose_features.WORLD_UP], [0.0, 0.0, 1.0])
+    assert measured[pose_features.DISTANCE] == pytest.approx(np.hypot(0.03, 0.02))
+    assert measured[pose_features.TILT] == pytest.approx(1.0)
+
+
+def test_the_time_to_contact_by_hand():
+    """0.10 m away, and 0.06 m more three steps ago: 1 m/s, so 0.1 s are left. A hand that goes away gets the limit."""
+    now, past = np.full((2, pose_features.WIDTH), 0.1), np.full((2, pose_features.WIDTH), 0.1)
+    past[:, pose_features.DISTANCE] = 0.16, 0.04
+    np.testing.assert_allclose(pose_features._time_to_contact(now, past, 3)[:, 0], [0.1, pose_features.LONGEST])
+
+
+def test_features_of_whole_episodes_equal_those_that_an_agent_sees(played: Openings):
+    """Two episodes of different lengths in one history; the first row begins again after the shorter one."""
+    first, second = (played.states[played.rows(number)].astype(float) for number in (0, 1))
+    history, whole = pose_features.History(), [pose_features.of_episode(one) for one in (first, second)]
+    history.reset(np.arange(2))
+    for t in range(len(second)):
+        if t == len(first):
+            history.reset(np.array([0]))
+        history.add(np.stack([first[t % len(first)], second[t]]))
+        seen = history.features(np.arange(2))
+        np.testing.assert_array_equal(seen, [whole[0][t % len(first)], whole[1][t]])
+    assert whole[0].shape == (len(first), pose_features.COUNT)
+
+
+def test_the_expected_success_by_hand():
+    """Each decision closes with probability 1/2, so it is reached with probability 1, 1/2 and 1/4."""
+    chance = stopping_trainer.expected_success(torch.zeros(3), torch.tensor([1.0, 0.0, 1.0]))
+    assert_close(chance, torch.tensor(0.5 + 0.125))
+    late = stopping_trainer.expected_success(torch.tensor([-50.0, -50.0, 50.0]), torch.tensor([0.0, 0.0, 1.0]))
+    assert_close(late, torch.tensor(1.0))
+
+
+def test_the_learning_rate_rises_from_a_25th_and_falls_to_nothing():
+    rates = [stopping_trainer.learning_rate(progress) for progress in (0.0, 0.15, 0.3, 0.65, 1.0)]
+    assert rates == pytest.approx([3e-3 / 25, 3e-3 * 0.52, 3e-3, 1.5e-3, 0.0])
+
+
+def zero_weights(edge: float) -> Arrays:
+    """Weights of two networks that output 0, with a ramp that is positive within `edge` [m]."""
+    sizes = (pose_features.COUNT, 4, 4, 2)
+    layers: Arrays = {}
+    for i in range(3):
+        layers |= {
+            f"network.{2 * i}": np.zeros((2, *sizes[i : i + 2])),
+            f"network.{2 * i + 1}": np.zeros((2, 1, sizes[i + 1])),
+        }
+    ones = np.ones(pose_features.COUNT)
+    return {**layers, "ramp": np.array([[edge, 100.0]] * 2), "mean": 0.0 * ones, "deviation": ones}
+
+
+def test_without_a_network_the_agent_closes_for_good_at_the_edge_of_the_ramp():
+    """The distances are 0.2, 0.15 (a decision), 0.05 (none), 0.05, and 0.3: it closes at the fourth state."""
+    states = np.zeros((5, 1, model.STATE))
+    states[..., :25] = model.initial_qpos()
+    states[..., model.PALM_POSITION] = 0.0
+    centre = task.palm_centre(states[0])[0]
+    for state, distance in zip(states, (0.2, 0.15, 0.05, 0.05, 0.3), strict=True):
+        state[..., model.BOTTLE_POSITION] = np.add(centre, [distance, 0.0, 0.0])
+    agent = StoppingAgent(zero_weights(edge=0.06))
+    agent.reset(np.array([0]))
+    assert [float(agent.act(state)[0, 0]) for state in states] == [-1.0, -1.0, -1.0, 1.0, 1.0]
+
+
+@pytest.fixture
+def trainer(tmp_path: Path, played: Openings) -> Callable[..., stopping_trainer.StoppingTrainer]:
+    """Makes trainers on the short settings."""
+
+    def make(*seeds: int) -> stopping_trainer.StoppingTrainer:
+        return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(played, len(played), "cpu"), seeds)
+
+    return make
+
+
+def test_training_learns_to_close_where_closing_succeeds(
+    trainer: Callable[..., stopping_trainer.StoppingTrainer], played: Openings
+):
+    learner = trainer(0)
+    before = learner.advance()[0]["stopping_loss"]
+    for _ in range(2):
+        after = learner.advance()[0]["stopping_loss"]
+    assert after < before - 0.1
+    solvable = [number for number in range(len(played)) if (played.outcomes[played.rows(number)] == SUCCEEDS).any()]
+    agent = StoppingAgent(learner.weights()[0])
+    scores = [episode.score for _, episode in rollout(agent, SOURCE, [CASES[number] for number in solvable], 2, 1)]
+    assert scores == [task.SUCCESS] * len(solvable)
+
+
+def test_impossible_numbers_are_refused():
+    with pytest.raises(BadNumber, match="--settings is -1"):
+        Stopping(settings=-1)
