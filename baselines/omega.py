@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar, Self
 
@@ -38,9 +38,9 @@ class Omega:
     near: float = 0.08
     """Among equally good actions: beyond this distance from the bottle [m], the one that opens most; within it, the one
     nearest to the last action."""
-    model: str = ""
+    model: str = field(default="", metadata={"in_label": False})
     """The file of a success model, or a source of reaches whose model ships; by default, the run's source."""
-    sha256: str = ""
+    sha256: str = field(default="", metadata={"in_label": False})
     """Refuse a model file with another SHA-256 than this."""
 
     def __post_init__(self) -> None:

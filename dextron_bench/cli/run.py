@@ -64,11 +64,12 @@ class Run:
     def _groups(self) -> list[list[plans.Run]]:
         """The runs of each method, one for each seed."""
         from dextron_bench.methods import registry
-        from dextron_bench.runs.plans import Plan, resolve
+        from dextron_bench.runs.plans import Plan, beside_other_code, resolve
 
         settings = settings_dict(self.settings)
         methods = registry.paper_methods(**settings) if self.all else [(self.method, settings)]
-        runs = [resolve(Plan(spec, self.reaches, self.split, 0, self.record, flags)) for spec, flags in methods]
+        plans = [Plan(spec, self.reaches, self.split, 0, self.record, flags) for spec, flags in methods]
+        runs = [beside_other_code(resolve(plan), self.runs) for plan in plans]
         reaches = self.reaches if self.all else runs[0].source
         floors = [name for name in registry.FLOORS if self.floors and name != self.method]
         runs += [resolve(Plan(name, reaches, self.split)) for name in floors]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import MISSING, Field, asdict, fields, is_dataclass
 from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 from dextron_bench.methods import loading, specs
 from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.loading import UnknownMethod, installed_methods
+from dextron_bench.storage import hashing
 from dextron_bench.world import model
 
 __all__ = ["UnknownMethod", "installed_methods"]  # Imported to be used as names of this module, too.
@@ -26,6 +27,7 @@ PAPER_METHODS: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of figure 
     ("rlil", {"dur": 0.1}),
     ("rlil", {"dur": 0.3}),
 )
+LONGEST_VALUE = 24  # Characters of a setting's value in a label.
 FLOORS = "nothing", "random"  # Methods without a strategy: every other method should score higher.
 CEILINGS = ("exp",)  # Methods that receive each setting's expert: the best possible score, not an entry.
 
@@ -101,8 +103,34 @@ def as_flags(text: str, settings: Mapping[str, Any]) -> str:
 
 
 def label(method: Entrant) -> str:
-    """The name of a method's runs and rows: its `label`, or its `name` if it has no label."""
-    return getattr(method, "label", method.name)
+    """The name of a method's runs and rows: its `label`, or else its `name` and the settings that are not the defaults.
+
+    An agent `mine` with `near` 0.06 has the label "mine-near0.06". A value that cannot be a part of a file's name gives
+    the first digits of its hash. A field with the metadata `{"in_label": False}` is left out.
+    """
+    named = getattr(method, "label", None)
+    return method.name + _differing_settings(method) if named is None else named
+
+
+def _differing_settings(method: Entrant) -> str:
+    """The settings that are not the defaults, as a label has them."""
+    if not is_dataclass(method):
+        return ""
+    labelled = [field for field in fields(method) if field.metadata.get("in_label", True)]
+    values = {field: getattr(method, field.name) for field in labelled}
+    return "".join(f"-{field.name}{_short(value)}" for field, value in values.items() if value != _default(field))
+
+
+def _default(field: Field[Any]) -> object:
+    return field.default if field.default_factory is MISSING else field.default_factory()
+
+
+def _short(value: object) -> str:
+    """A value as a part of a label."""
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    if len(text) <= LONGEST_VALUE and NAME.fullmatch(f"a{text}"):
+        return text
+    return hashing.digest(repr(value).encode())[:8]
 
 
 def run_source(method: Entrant, reaches: str) -> str:

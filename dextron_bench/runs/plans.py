@@ -12,7 +12,8 @@ from dextron_bench.methods import weights as method_weights
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.registry import Entrant
 from dextron_bench.splits.loading import ranking_splits
-from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.storage import schemas
+from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.training.jobs import TrainingJob
 
 
@@ -95,6 +96,20 @@ def resolve(plan: Plan) -> Run:
     policy = method.source_policy if isinstance(method, PolicyTransfer) else method
     learner = policy if isinstance(policy, Learner) else None
     return Run(plan, method, learner, registry.label(method), registry.run_source(method, plan.reaches))
+
+
+def beside_other_code(run: Run, runs: Path) -> Run:
+    """The run, with a hash in its label if the folder of its label holds runs of another version of its file.
+
+    A learner keeps its label, which its training and its weights have too.
+    """
+    code = run.config()["code"]
+    if run.learner is not None or not code["sha256"]:
+        return run
+    folders = [folder for folder in run_folders(runs, run.label) if folder.config.exists()]
+    if all(schemas.read(folder.config, schemas.CONFIG).get("code") == code for folder in folders):
+        return run
+    return replace(run, label=f"{run.label}+{code['sha256'][:8]}")
 
 
 def with_shipped_weights(run: Run, seeds: Sequence[int]) -> list[Run]:

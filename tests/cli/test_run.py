@@ -18,6 +18,7 @@ import pytest
 from safetensors.numpy import save_file
 
 from dextron_bench.cli import main
+from dextron_bench.methods import loading
 from dextron_bench.runs import result_files
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
@@ -192,6 +193,30 @@ def test_published_rows_of_the_same_splits_and_physics_stand_beside_the_new_ones
     result["provenance"]["physics"] = "another"
     file.write_text(json.dumps(result))
     assert origins() == {"nothing": "this run"}
+
+
+def test_every_configuration_has_a_folder_and_a_row(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    """Two settings, and then another version of the file: four runs side by side, and each is read again."""
+    text = ODD.format(field="near: float = 0.1").replace(
+        "...", "from baselines.floors import Nothing; return Nothing().agent(seed)"
+    )
+
+    def labels(*flags: str) -> list[str]:
+        for name in [name for name in sys.modules if name.startswith(loading.PREFIX)]:
+            monkeypatch.delitem(sys.modules, name)  # A new process would load the file again.
+        words = ["run", "--method", "odd.py:Odd", *flags, "--no-floors", "--record", "0", "--split", "test", "--quiet"]
+        return [row["method"] for row in rows(capsys, *words)]
+
+    (here / "odd.py").write_text(text)
+    assert labels() + labels("--near", "0.2") + labels() == ["odd", "odd-near0.2", "odd"]
+    (here / "odd.py").write_text(text + "# Changed.\n")
+    digest = hashing.sha256(here / "odd.py")[:8]
+    assert labels() + labels("--near", "0.2") + labels() == [f"odd+{digest}", f"odd-near0.2+{digest}", f"odd+{digest}"]
+    (here / "odd.py").write_text(text)
+    assert labels() == ["odd"]
+    assert len(rows(capsys, "leaderboard", "show")) == 4
 
 
 def test_weights_of_a_file_give_the_row_of_its_run(here: Path, capsys: pytest.CaptureFixture[str]):

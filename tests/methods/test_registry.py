@@ -14,6 +14,7 @@ from baselines.floors import Nothing, Random
 from dextron_bench.methods import loading, registry
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.registry import UnknownMethod
+from dextron_bench.storage import hashing
 
 AGENT = """
 from pathlib import Path
@@ -128,6 +129,40 @@ def test_a_method_that_cannot_be_created_raises(file: Callable[[str], Path]):
     place = file("class Mine:\n    name = 'mine'\n    def __init__(self, size): ...\n    def agent(self, seed): ...\n")
     with pytest.raises(AgentError, match=r"^making method .* raised TypeError: .*'size'"):
         registry.create(f"{place}:Mine")
+
+
+SETTINGS = """
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+@dataclass(frozen=True)
+class Mine:
+    name: ClassVar[str] = "mine"
+    near: float = 0.08
+    mode: str = "fast"
+    sizes: tuple[int, ...] = (1, 2)
+    table: dict = field(default_factory=dict)
+    hidden: str = field(default="", metadata={"in_label": False})
+
+    def agent(self, seed): ...
+"""
+
+
+@pytest.mark.parametrize(
+    ("settings", "label"),
+    [
+        ({}, "mine"),
+        ({"near": 0.08, "table": {}, "hidden": "x"}, "mine"),
+        ({"near": 0.06}, "mine-near0.06"),
+        ({"mode": "slow", "near": 2.0}, "mine-near2-modeslow"),
+        ({"mode": "../up"}, "mine-mode" + hashing.digest(b"'../up'")[:8]),
+        ({"sizes": (3, 4)}, "mine-sizes" + hashing.digest(b"(3, 4)")[:8]),
+    ],
+)
+def test_settings_that_differ_from_the_defaults_are_in_the_label(
+    file: Callable[[str], Path], settings: dict, label: str
+):
+    assert registry.label(registry.create(f"{file(SETTINGS)}:Mine", settings)) == label
 
 
 def test_the_description_of_a_broken_installed_method_says_why(monkeypatch: pytest.MonkeyPatch):
