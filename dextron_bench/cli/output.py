@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -12,6 +13,7 @@ from dextron_bench.storage.printable import printable
 from dextron_bench.storage.progress import Progress, no_progress
 
 WIDTH = 1000  # Columns of a table that is not printed on a terminal, so that no cell is folded.
+LINE_PERIOD = 60.0  # [s] between lines of progress where there is no terminal.
 RATE_PERIOD = 300.0  # [s] for the estimate of rate and time left; a block of a search takes up to a minute.
 
 
@@ -40,9 +42,12 @@ def print_json(value: Any) -> None:
 
 @contextmanager
 def progress_bar(title: str, quiet: bool = False) -> Iterator[Progress]:
-    """Shows a bar with count, rate and time left on stderr; shows nothing if `quiet` or if stderr is no terminal."""
-    if quiet or not sys.stderr.isatty():
+    """Shows a bar with count, rate and time left on stderr, or a line each minute if stderr is no terminal."""
+    if quiet:
         yield no_progress
+        return
+    if not sys.stderr.isatty():
+        yield _Lines(title)
         return
     from rich import progress as rich
     from rich.console import Console
@@ -60,6 +65,32 @@ def progress_bar(title: str, quiet: bool = False) -> Iterator[Progress]:
             bars.update(task, rate=_rate(bars.tasks[0].speed))
 
         yield report
+
+
+class _Lines:
+    """A progress report that prints a line when LINE_PERIOD has passed since the last one, or since the start."""
+
+    def __init__(self, title: str) -> None:
+        self._title, self._start = title, time.monotonic()
+        self._printed, self._first = self._start, -1
+
+    def __call__(self, done: int, total: int, note: str = "") -> None:
+        now = time.monotonic()
+        self._first = done if self._first < 0 else self._first  # What was done before is not part of the rate.
+        if now - self._printed < LINE_PERIOD:
+            return
+        self._printed = now
+        speed = (done - self._first) / (now - self._start)
+        left = f", {_duration((total - done) / speed)} left" if total and speed else ""
+        parts = f"{self._title}: {done}{f'/{total}' if total else ''}", f"{_rate(speed)}{left}", printable(note)
+        print(", ".join(filter(None, parts)), file=sys.stderr, flush=True)
+
+
+def _duration(seconds: float) -> str:
+    """A duration in hours and minutes, or in seconds."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min" if minutes else f"{rest} s"
 
 
 def _rate(speed: float | None) -> str:

@@ -61,3 +61,23 @@ def test_no_bar_appears_without_a_terminal_or_when_quiet(
 @pytest.mark.parametrize(("speed", "text"), [(None, ""), (0.0123, "0.012/s"), (4.56, "4.6/s"), (1234.5, "1234/s")])
 def test_rates_are_short(speed: float | None, text: str):
     assert output._rate(speed) == text
+
+
+def test_without_a_terminal_a_line_each_minute_says_what_is_done_and_left(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
+    """100 of 400 were done before; then 20 in the first two minutes: 10 a minute, so 280 take 28 minutes."""
+    now = 1000.0
+    monkeypatch.setattr(output.time, "monotonic", lambda: now)
+    with output.progress_bar("rows") as progress:
+        progress(100, 400)
+        for now, done in ((1030.0, 105), (1059.0, 109), (1120.0, 120), (1150.0, 125), (1180.0, 130)):  # noqa: B007
+            progress(done, 400, "val 3.1")
+    assert capsys.readouterr() == (
+        "",
+        "rows: 120/400, 0.17/s, 28 min left, val 3.1\nrows: 130/400, 0.17/s, 27 min left, val 3.1\n",
+    )
+
+
+def test_a_duration_has_two_units_at_most():
+    assert [output._duration(seconds) for seconds in (59.4, 61.0, 7320.0)] == ["59 s", "1 min", "2 h 2 min"]
