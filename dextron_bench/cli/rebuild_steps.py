@@ -80,7 +80,7 @@ def _show(method: str, reaches: str = "real") -> str:
 
 STEPS: tuple[Step, ...] = (
     _search("real", 10_000),
-    _search("synthetic", 5_000),
+    _search("synthetic", 6_000),
     *map(_splits, ("real", "synthetic", "minjerk")),
     *(_run(name, name, reaches) for reaches in ("real", "synthetic") for name in RULES),
     *(_run(name, name, "minjerk") for name in ("nothing", "random")),
