@@ -21,6 +21,8 @@ from dextron_bench.cli import (
     recordings,
     recordings_choose,
     run,
+    runs,
+    runs_edit,
     splits,
     submit,
     success,
@@ -61,6 +63,14 @@ COMMANDS: dict[str, type[Command] | Group] = {
         {"list": recordings.List, "export": recordings.Export, "choose": recordings_choose.Choose},
     ),
     "list": listing.List,
+    "runs": (
+        "Runs: list, show and compare them, find the best, mark them, put them away, export them.",
+        {
+            **{"list": runs.List, "show": runs.Show, "compare": runs.Compare, "best": runs.Best},
+            **{"tag": runs_edit.Tag, "note": runs_edit.Note, "archive": runs_edit.Archive, "rm": runs_edit.Remove},
+            "export": runs_edit.Export,
+        },
+    ),
     "data": (
         "Reaches: import or download the recorded ones, describe a source, fit and evaluate the synthetic ones; "
         "export episodes for offline learning.",

@@ -76,15 +76,21 @@ class Run:
         return [[run.with_seed(seed) for seed in dict.fromkeys(self.seed)] for run in runs]
 
     def _execute(self, groups: list[list[plans.Run]]) -> int:
-        from dextron_bench.runs import execution, result_files
+        from dextron_bench.runs import annotations, execution, result_files
         from dextron_bench.scores import standings
 
         results = []
         for group in groups:
-            with progress_bar(f"{group[0].label}, epochs", self.quiet) as progress:
+            with (
+                annotations.noting_failure([run.folder(self.runs) for run in group]),
+                progress_bar(f"{group[0].label}, epochs", self.quiet) as progress,
+            ):
                 execution.train(group, self.runs, self.threads, self.device, progress)
             for run in group:
-                with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:
+                with (
+                    annotations.noting_failure([run.folder(self.runs)]),
+                    progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress,
+                ):
                     folder = execution.execute(run, self.runs, self.threads, progress)
                 results.append(result_files.read_result(run.folder(self.runs).result))
                 if run.plan.record and not self.json:

@@ -81,6 +81,11 @@ class RunFolder:
         return self.path / "result.json"
 
     @property
+    def failure(self) -> Path:
+        """The file with the error that ended the last attempt of the run, if it failed."""
+        return self.path / "failure.json"
+
+    @property
     def recordings(self) -> Path:
         """The folder of recordings."""
         return self.path / "recordings"

@@ -30,6 +30,7 @@ except ImportError:  # On Windows, nothing stops two processes from training in 
 
 CHECKPOINT = "checkpoint.safetensors"
 JOURNALS = "journals"
+LOCK = ".lock"
 
 
 class Busy(RuntimeError):
@@ -61,7 +62,7 @@ class Checkpoints:
     def locked(self) -> Iterator[None]:
         """Locks the folder for this process; raises Busy if another process holds the lock."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / ".lock").open("w") as lock:
+        with (self.folder / LOCK).open("w") as lock:
             try:
                 if fcntl:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -72,6 +73,19 @@ class Checkpoints:
             for file in self.folder.rglob(f".*{atomic.PART}"):  # From a process that was killed while it wrote.
                 file.unlink()
             yield
+
+    @property
+    def is_locked(self) -> bool:
+        """True if another process trains in the folder."""
+        file = self.folder / LOCK
+        if fcntl is None or not file.exists():
+            return False
+        with file.open() as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return True
+        return False
 
     def progress(self) -> TrainingProgress | None:
         """The progress in the last checkpoint, None if there is no checkpoint; raises DamagedFile."""

@@ -99,12 +99,13 @@ class TrainingJob:
 
 @dataclass(frozen=True, slots=True)
 class UnfinishedTraining:
-    """A training with epochs left; `left` says how many, in words."""
+    """A training with epochs left; `left` says how many, in words. It is running if a process holds its lock."""
 
     label: str
     reaches: str
     seeds: tuple[int, ...]
     left: str
+    is_running: bool
 
 
 def unfinished(runs: Path) -> list[UnfinishedTraining]:
@@ -115,7 +116,7 @@ def unfinished(runs: Path) -> list[UnfinishedTraining]:
         if not progress or not progress.over:
             left = f"{progress.epochs - progress.epoch} of {progress.epochs} epochs" if progress else "all epochs"
             label, reaches = folder.parts[-3:-1]
-            trainings.append(UnfinishedTraining(label, reaches, group, left))
+            trainings.append(UnfinishedTraining(label, reaches, group, left, Checkpoints(folder, group).is_locked))
     return trainings
 
 

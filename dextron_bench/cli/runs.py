@@ -1,0 +1,253 @@
+"""`dextron-bench runs list, show, compare, best`: finds runs and shows what they have scored."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from dextron_bench.cli.exit_codes import DONE
+from dextron_bench.cli.leaderboard import none_for_nan
+from dextron_bench.cli.output import print_json, print_table
+
+if TYPE_CHECKING:
+    from dextron_bench.runs.catalogue import Entry
+
+COLUMNS = ("run", "state", "seeds", "val", "return", "success", "date", "tags", "note")
+SETTINGS = "settings."  # Begins the name of a column with a setting.
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Which runs; an option that is not given selects all."""
+
+    method: str = ""
+    """A pattern of labels, such as "rlil*"."""
+    reaches: str = ""
+    """The source of reaches."""
+    setting: tuple[str, ...] = ()
+    """Settings with their values, such as near=0.06."""
+    tag: tuple[str, ...] = ()
+    """Tags that a run must have."""
+    since: str = ""
+    """A date, such as 2026-01-31: only runs that changed since."""
+    state: str = ""
+    """The beginning of a state: done, training, stopped, unfinished, failed."""
+
+
+@dataclass(frozen=True)
+class List:
+    """List runs with their states and scores, a row for all seeds of a configuration.
+
+    Example: dextron-bench runs list --method "rlil*" --sort return --split test
+    """
+
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    filter: Annotated[Filter, tyro.conf.arg(name="")] = field(default_factory=Filter)
+    split: str = "test"
+    """The split of the columns `return` and `success`."""
+    sort: Literal["name", "date", "return", "success"] = "name"
+    """The order: by name, newest first, or highest score on the split first."""
+    columns: tuple[str, ...] = COLUMNS
+    """The columns: some of run, state, seeds, val, return, success, date, tags, note, physics, settings.NAME."""
+    json: bool = False
+    """Print JSON."""
+    csv: bool = False
+    """Print comma-separated values."""
+
+    def __call__(self) -> int:
+        from dextron_bench.runs import catalogue, search
+
+        chosen = search.RunFilter(**vars(self.filter))
+        entries = search.ordered(filter(chosen.passes, catalogue.entries(self.runs)), self.sort, self.split)
+        rows = [{name: _cell(entry, name, self.split) for name in self.columns} for entry in entries]
+        if self.json:
+            print_json(rows)
+        elif self.csv:
+            writer = csv.writer(sys.stdout, lineterminator="\n")
+            writer.writerows([self.columns, *([_plain(row[name]) for name in self.columns] for row in rows)])
+        else:
+            cells = [[_shown(row[name], name) for name in self.columns] for row in rows]
+            print_table(f"runs in {self.runs}, scores on {self.split}", self.columns, cells)
+        return DONE
+
+
+@dataclass(frozen=True)
+class Show:
+    """Show everything about a run: settings, code, state, and scores on every split.
+
+    Example: dextron-bench runs show rlil-0.1/real
+    """
+
+    run: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+    """The run: its label, or its label and source of reaches, as in rlil-0.1/real."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self) -> int:
+        from dextron_bench.runs import catalogue
+
+        entry = catalogue.find(catalogue.entries(self.runs), self.run)
+        about = {name: _cell(entry, name, "test") for name in ("run", "state", "date", "tags", "note", "physics")}
+        about |= {"folder": str(entry.folder), "seeds": list(entry.seeds), "code": _code(entry)}
+        about["settings"] = dict(entry.settings)
+        splits = [
+            {"split": name, "seeds": len(scores), "rows": scores.shape[1]}
+            | {what: entry.score(name, what) for what in ("return", "success")}
+            for name, scores in entry.scores.items()
+        ]
+        if self.json:
+            print_json(about | {"splits": splits})
+            return DONE
+        print_table(entry.name, ["", ""], [[name, _plain(value)] for name, value in about.items() if name != "run"])
+        columns = ["split", "seeds", "rows", "return", "success"]
+        print_table("scores", columns, [[_shown(row[name], name) for name in columns] for row in splits])
+        return DONE
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Compare runs: the settings that differ, the scores with intervals, and the learning curves in one picture.
+
+    `dextron-bench compare` tests two methods on equal settings.
+
+    Example: dextron-bench runs compare rl-hold40/real rlil-0.1/real --into curves.png
+    """
+
+    run: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+    """The runs, by label, or by label and source of reaches."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
+    """Draw the learning curves into this file."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self) -> int:
+        from dextron_bench.runs import catalogue, search
+
+        known = catalogue.entries(self.runs)
+        entries = [catalogue.find(known, name) for name in self.run]
+        names = search.differing_settings(entries)
+        settings = {entry.name: {name: _setting(entry, name) for name in names} for entry in entries}
+        scores = _scores(entries)
+        if self.json:
+            print_json({"settings": settings, "scores": scores})
+        else:
+            rows = [[name, *(_plain(settings[entry.name][name]) for entry in entries)] for name in names]
+            print_table("settings that differ", ["", *(entry.name for entry in entries)], rows)
+            cells = [[_plain(value) for value in row.values()] for row in scores]
+            print_table("scores", list(scores[0]) if scores else ["split"], cells)
+        if self.into is not None:
+            _draw(entries, self.into)
+        return DONE
+
+
+@dataclass(frozen=True)
+class Best:
+    """Print the run with the highest mean return on a split, by default `val`, which no ranking uses.
+
+    Example: dextron-bench runs best --method "mine*" --split val
+    """
+
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    filter: Annotated[Filter, tyro.conf.arg(name="")] = field(default_factory=Filter)
+    split: str = "val"
+    """The split; on `val`, a run that has not played it counts with the best point of its learning curves."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self) -> int:
+        from dextron_bench.runs import catalogue, search
+
+        chosen = search.RunFilter(**vars(self.filter))
+        entries = search.ordered(filter(chosen.passes, catalogue.entries(self.runs)), "return", self.split)
+        if not entries or entries[0].score(self.split) != entries[0].score(self.split):
+            raise search.BadSearch(f"none of the {len(entries)} runs has a score on {self.split!r}")
+        best = entries[0]
+        row = {"run": best.name, "return": best.score(self.split), "success": best.score(self.split, "success")}
+        row |= {"seeds": len(best.seeds), "settings": dict(best.settings)}
+        if self.json:
+            print_json(row)
+        else:
+            print(f"{best.name}: return {row['return']:.2f}, success {100 * row['success']:.1f} % on {self.split}")
+        return DONE
+
+
+def _cell(entry: Entry, name: str, split: str) -> Any:
+    """The value of a column, as JSON has it; raises BadSearch."""
+    values = {
+        **{"run": entry.name, "state": entry.state, "seeds": len(entry.seeds), "note": entry.note},
+        **{"val": none_for_nan(entry.score("val")), "return": none_for_nan(entry.score(split))},
+        "success": none_for_nan(entry.score(split, "success")),
+        **{"date": entry.changed.strftime("%Y-%m-%d %H:%M"), "tags": list(entry.tags), "physics": entry.physics[:8]},
+    }
+    if name.startswith(SETTINGS):
+        return entry.settings.get(name.removeprefix(SETTINGS))
+    if name not in values:
+        from dextron_bench.runs import search
+
+        raise search.BadSearch(f"no column {name!r}; choose from {', '.join(values)} and {SETTINGS}NAME")
+    return values[name]
+
+
+def _setting(entry: Entry, name: str) -> Any:
+    return {"code": _code(entry), "physics": entry.physics, **entry.settings}.get(name)
+
+
+def _code(entry: Entry) -> str:
+    """The class of a run's method, and the first digits of the hash of its file if it is in a file."""
+    return " ".join(filter(None, (entry.code.get("class"), (entry.code.get("sha256") or "")[:8])))
+
+
+def _plain(value: Any) -> str:
+    """A value as text for a table or CSV; nothing for None."""
+    if value is None:
+        return ""
+    return " ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+
+
+def _shown(value: Any, name: str) -> str:
+    """A value as a person reads it: scores rounded, success as a percentage."""
+    if name == "success" and value is not None:
+        return f"{100 * value:.1f} %"
+    return f"{value:.2f}" if isinstance(value, float) else _plain(value)
+
+
+def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+    """A row for each split, with each run's mean return and its interval."""
+    import numpy as np
+
+    from dextron_bench.scores import statistics
+
+    rows = []
+    for split in dict.fromkeys(split for entry in entries for split in entry.scores):
+        row = {"split": split}
+        for entry in entries:
+            if split in entry.scores:
+                score = statistics.estimate(entry.scores[split], np.random.default_rng(0))
+                row[entry.name] = f"{score.mean:.2f} [{score.low:.2f}, {score.high:.2f}]"
+        rows.append({"split": split, **{entry.name: row.get(entry.name) for entry in entries}})
+    return rows
+
+
+def _draw(entries: Sequence[Entry], file: Path) -> None:
+    import pandas as pd
+
+    from dextron_bench.scores import figures
+
+    curves = {
+        entry.name: {seed: pd.DataFrame(points) for seed, points in entry.curves.items()}
+        for entry in entries
+        if entry.curves
+    }
+    figures.learning_curves(curves, pd.DataFrame(columns=["split", "method", "return"]), file)

@@ -1,0 +1,156 @@
+"""`dextron-bench runs tag, note, archive, rm, export`: marks runs, puts them away, and writes them for MLflow."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from dextron_bench.cli.exit_codes import DONE
+
+if TYPE_CHECKING:
+    from dextron_bench.runs.catalogue import Entry
+
+ARCHIVE = "archive"  # Beside the folder of all runs, after its name.
+RunName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+
+
+class NotConfirmed(ValueError):
+    """Runs that would be removed without a confirmation."""
+
+
+class AlreadyArchived(ValueError):
+    """An archive that holds a run of the same name."""
+
+
+@dataclass(frozen=True)
+class Tag:
+    """Add tags to a run, or remove them.
+
+    Example: dextron-bench runs tag rlil-0.1/real baseline paper
+    """
+
+    run: RunName
+    """The run: its label, or its label and source of reaches, as in rlil-0.1/real."""
+    tags: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="TAG")]
+    """The tags."""
+    remove: bool = False
+    """Remove these tags instead."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+
+    def __call__(self) -> int:
+        from dextron_bench.runs import annotations
+
+        folder = _find(self.runs, self.run).folder
+        notes = annotations.read(folder)
+        others = tuple(tag for tag in notes.tags if tag not in self.tags)
+        annotations.write(folder, replace(notes, tags=others if self.remove else (*others, *self.tags)))
+        return DONE
+
+
+@dataclass(frozen=True)
+class Note:
+    """Write a note to a run, in the place of its old one.
+
+    Example: dextron-bench runs note rlil-0.1/real "The first run with the new rewards."
+    """
+
+    run: RunName
+    """The run: its label, or its label and source of reaches, as in rlil-0.1/real."""
+    text: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TEXT")]
+    """The note; an empty text removes it."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+
+    def __call__(self) -> int:
+        from dextron_bench.runs import annotations
+
+        folder = _find(self.runs, self.run).folder
+        annotations.write(folder, replace(annotations.read(folder), note=self.text))
+        return DONE
+
+
+@dataclass(frozen=True)
+class Archive:
+    """Move runs out of the way, into a folder beside the folder of all runs; move them back to use them again.
+
+    Example: dextron-bench runs archive mine-near0.06/synthetic
+    """
+
+    run: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+    """The runs, by label, or by label and source of reaches."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+
+    def __call__(self) -> int:
+        archive = self.runs.with_name(f"{self.runs.name}-{ARCHIVE}")
+        for entry in [_find(self.runs, name) for name in self.run]:
+            place = archive / entry.name
+            if place.exists():
+                raise AlreadyArchived(f"{place} exists; remove it, or give it another name")
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.move(entry.folder, place)
+            print(place)
+        return DONE
+
+
+@dataclass(frozen=True)
+class Remove:
+    """Remove runs with all their files, after a question.
+
+    Example: dextron-bench runs rm mine-near0.06/synthetic --yes
+    """
+
+    run: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+    """The runs, by label, or by label and source of reaches."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    yes: bool = False
+    """Remove them without a question."""
+
+    def __call__(self) -> int:
+        entries = [_find(self.runs, name) for name in self.run]
+        if not self.yes:
+            names = ", ".join(entry.name for entry in entries)
+            if not sys.stdin.isatty():
+                raise NotConfirmed(f"{names} would be removed for good; confirm with --yes")
+            if input(f"remove {names} for good? [y/N] ").strip().lower() not in ("y", "yes"):
+                return DONE
+        for entry in entries:
+            shutil.rmtree(entry.folder)
+        return DONE
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write runs in MLflow's file format, with settings, scores and learning curves.
+
+    Example: dextron-bench runs export --into mlruns
+    """
+
+    into: Path
+    """The folder to write, new or empty; `MLFLOW_ALLOW_FILE_STORE=true mlflow ui --backend-store-uri FOLDER` opens it,
+    and `mlflow migrate-filestore` turns it into a database."""
+    run: Annotated[tuple[str, ...], tyro.conf.arg(metavar="RUN")] = ()
+    """The runs; all by default."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+
+    def __call__(self) -> int:
+        from dextron_bench.runs import catalogue, mlflow_files
+
+        entries = catalogue.entries(self.runs)
+        chosen = [catalogue.find(entries, name) for name in self.run] if self.run else entries
+        print(f"{mlflow_files.write(chosen, self.into)} runs in {self.into}")
+        return DONE
+
+
+def _find(runs: Path, name: str) -> Entry:
+    from dextron_bench.runs import catalogue
+
+    return catalogue.find(catalogue.entries(runs), name)

@@ -1,0 +1,69 @@
+"""What a person says of a run, its tags and its note, and what went wrong in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage.run_folder import RunFolder
+
+NOTES = "notes.json"  # In the folder of a method's runs on one source of reaches.
+TAG = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
+LONGEST = 2000  # Characters of a note.
+
+
+class BadNote(ValueError):
+    """A tag with other characters than letters, digits and . _ + -, or a note that is too long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Notes:
+    """The tags and the note of a run. Raises BadNote."""
+
+    tags: tuple[str, ...] = ()
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for tag in self.tags:
+            if not TAG.fullmatch(tag):
+                raise BadNote(f"tag {tag!r}: use letters, digits and . _ + -")
+        if len(self.note) > LONGEST:
+            raise BadNote(f"a note has at most {LONGEST} characters, not {len(self.note)}")
+
+
+def read(folder: Path) -> Notes:
+    """The notes in a folder, empty if there are none; raises DamagedFile."""
+    file = folder / NOTES
+    if not file.exists():
+        return Notes()
+    content = schemas.read(file, schemas.NOTES)
+    return Notes(tuple(content["tags"]), content["note"])
+
+
+def write(folder: Path, notes: Notes) -> None:
+    """Replaces the notes in a folder."""
+    atomic.write_json(folder / NOTES, {"tags": sorted(set(notes.tags)), "note": notes.note})
+
+
+def failure(run: RunFolder) -> str:
+    """Why the last attempt of a run failed, in one line; empty if it did not. Raises DamagedFile."""
+    return schemas.read(run.failure, schemas.FAILURE)["error"] if run.failure.exists() else ""
+
+
+@contextmanager
+def noting_failure(attempted: Sequence[RunFolder]) -> Iterator[None]:
+    """Writes the error that ends an attempt of runs into their folders; removes it after a success."""
+    try:
+        yield
+    except Exception as error:
+        text = " ".join(str(error).split())
+        for run in attempted:
+            if run.config.exists():
+                atomic.write_json(run.failure, {"error": f"{type(error).__name__}: {text}"})
+        raise
+    for run in attempted:
+        run.failure.unlink(missing_ok=True)

@@ -1,0 +1,130 @@
+"""The catalogue of a folder of runs: what each method with its settings has scored, and how far it is."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dextron_bench.runs import annotations, result_files
+from dextron_bench.storage import schemas
+from dextron_bench.storage.run_folder import RunFolder, run_folders
+from dextron_bench.training import jobs
+from dextron_bench.world import task
+
+DONE, UNFINISHED = "done", "unfinished"
+VAL = "val"
+
+
+class UnknownRun(LookupError):
+    """A name that no run has, or that several runs have."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """All seeds of a method with its settings on one source of reaches.
+
+    `scores` holds, by split, the scores (seeds, rows) of the seeds that have played it. `curves` holds, by seed, the
+    learning curve: points with `epoch`, and `return` and `success` on `val`. `state` says in words how far it is.
+    """
+
+    label: str
+    reaches: str
+    folder: Path
+    seeds: tuple[int, ...]
+    settings: Mapping[str, Any]
+    code: Mapping[str, Any]
+    physics: str
+    state: str
+    changed: datetime
+    scores: Mapping[str, np.ndarray] = field(default_factory=dict)
+    curves: Mapping[int, Sequence[Mapping[str, float]]] = field(default_factory=dict)
+    tags: tuple[str, ...] = ()
+    note: str = ""
+
+    @property
+    def name(self) -> str:
+        """Label and source of reaches, such as "rlil-0.1/real"."""
+        return f"{self.label}/{self.reaches}"
+
+    def score(self, split: str, what: str = "return") -> float:
+        """Mean return, or success rate, on a split; NaN if no seed has played it.
+
+        On `val` it is the best point of the learning curves if the split itself was not played.
+        """
+        if split in self.scores:
+            values = self.scores[split] if what == "return" else self.scores[split] == task.SUCCESS
+            return float(values.mean())
+        if split == VAL and self.curves:
+            best = [max(points, key=lambda point: point["return"]) for points in self.curves.values()]
+            return float(np.mean([point[what] for point in best]))
+        return float("nan")
+
+
+def entries(runs: Path) -> list[Entry]:
+    """The entries of a folder of runs, in the order of their names; raises DamagedFile."""
+    groups: dict[Path, list[RunFolder]] = defaultdict(list)
+    for run in run_folders(runs):
+        if run.config.exists():
+            groups[run.path.parent].append(run)
+    left = {(training.label, training.reaches): training for training in jobs.unfinished(runs)}
+    return [_entry(folder, sorted(members, key=lambda run: run.seed), left) for folder, members in groups.items()]
+
+
+def find(all_entries: Iterable[Entry], name: str) -> Entry:
+    """The entry with a label, or with a label and a source of reaches; raises UnknownRun."""
+    known = list(all_entries)
+    matching = [entry for entry in known if name in (entry.name, entry.label)]
+    if len(matching) == 1:
+        return matching[0]
+    if matching:
+        raise UnknownRun(f"several runs are called {name!r}; choose {' or '.join(entry.name for entry in matching)}")
+    raise UnknownRun(f"no run is called {name!r}; the folder has {', '.join(entry.name for entry in known) or 'none'}")
+
+
+def _entry(
+    folder: Path, members: Sequence[RunFolder], left: Mapping[tuple[str, str], jobs.UnfinishedTraining]
+) -> Entry:
+    label, reaches = folder.parts[-2:]
+    config = schemas.read(members[0].config, schemas.CONFIG)
+    results = [result_files.read_result(run.result) for run in members if run.result.exists()]
+    notes = annotations.read(folder)
+    return Entry(
+        label,
+        reaches,
+        folder,
+        tuple(run.seed for run in members),
+        config.get("settings", {}),
+        config.get("code", {}),
+        config.get("physics", ""),
+        _state(members, left.get((label, reaches))),
+        datetime.fromtimestamp(max(run.path.stat().st_mtime for run in members), UTC),
+        _scores(results),
+        {run.seed: schemas.read(run.curve, schemas.CURVE)["points"] for run in members if run.curve.exists()},
+        notes.tags,
+        notes.note,
+    )
+
+
+def _state(members: Sequence[RunFolder], training: jobs.UnfinishedTraining | None) -> str:
+    """How far the seeds of an entry are, in words."""
+    if failures := [text for run in members if (text := annotations.failure(run))]:
+        return f"failed: {failures[0]}"
+    if training is not None:
+        return f"{'training' if training.is_running else 'stopped'}, {training.left} left"
+    return DONE if all(run.result.exists() for run in members) else UNFINISHED
+
+
+def _scores(results: Iterable[Mapping[str, Any]]) -> dict[str, np.ndarray]:
+    """The scores (seeds, rows) of each split, of the seeds whose rows are as many as the first seed's."""
+    by_split: dict[str, list[list[float]]] = defaultdict(list)
+    for result in results:
+        for split, scores in result["splits"].items():
+            if not by_split[split] or len(by_split[split][0]) == len(scores["scores"]):
+                by_split[split].append(scores["scores"])
+    return {split: np.array(rows, float) for split, rows in by_split.items()}

@@ -1,0 +1,97 @@
+"""Searches the catalogue of runs: filters, orders and picks the best."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from fnmatch import fnmatchcase
+
+from dextron_bench.runs.catalogue import Entry
+
+SCORES = ("return", "success")
+ORDERS = ("name", "date", *SCORES)
+
+
+class BadSearch(ValueError):
+    """A filter that no run could pass, or an order that does not exist."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunFilter:
+    """Selects runs; an empty entry selects all. Raises BadSearch.
+
+    `method` is a pattern of labels, such as "rlil*". `setting` are texts such as "near=0.06". `since` is a date such as
+    "2026-01-31". `state` is the beginning of a state, such as "done" or "failed".
+    """
+
+    method: str = ""
+    reaches: str = ""
+    setting: tuple[str, ...] = ()
+    tag: tuple[str, ...] = ()
+    since: str = ""
+    state: str = ""
+
+    def __post_init__(self) -> None:
+        for text in self.setting:
+            if "=" not in text:
+                raise BadSearch(f"--setting {text!r}: write a name and a value, as in near=0.06")
+        if self.since:
+            _date(self.since)
+
+    def passes(self, entry: Entry) -> bool:
+        """True for a run that the filter selects."""
+        wanted = [text.partition("=") for text in self.setting]
+        return (
+            (not self.method or fnmatchcase(entry.label, self.method))
+            and self.reaches in ("", entry.reaches)
+            and all(name in entry.settings and _equal(entry.settings[name], value) for name, _, value in wanted)
+            and set(self.tag) <= set(entry.tags)
+            and (not self.since or entry.changed >= _date(self.since))
+            and entry.state.startswith(self.state)
+        )
+
+
+def ordered(entries: Iterable[Entry], order: str, split: str) -> list[Entry]:
+    """Entries by name, with the newest first by "date", with the highest score on a split first by "return", "success".
+
+    Entries without the score come last. Raises BadSearch.
+    """
+    known = sorted(entries, key=lambda entry: (entry.label, entry.reaches))
+    if order == "name":
+        return known
+    if order == "date":
+        return sorted(known, key=lambda entry: entry.changed, reverse=True)
+    if order not in SCORES:
+        raise BadSearch(f"--sort {order!r}: choose from {', '.join(ORDERS)}")
+    return sorted(known, key=lambda entry: _last_if_nan(entry.score(split, order)))
+
+
+def differing_settings(entries: Sequence[Entry]) -> list[str]:
+    """Names of the settings in which entries differ, with "code" and "physics" if these do."""
+    names = list(dict.fromkeys(name for entry in entries for name in entry.settings))
+    differing = [name for name in names if len({repr(entry.settings.get(name)) for entry in entries}) > 1]
+    others = {"code": [entry.code for entry in entries], "physics": [entry.physics for entry in entries]}
+    return differing + [name for name, values in others.items() if len(set(map(repr, values))) > 1]
+
+
+def _last_if_nan(score: float) -> float:
+    return math.inf if math.isnan(score) else -score
+
+
+def _equal(value: object, text: str) -> bool:
+    """True if a setting has the value that a text gives; numbers are compared as numbers."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        try:
+            return float(text) == value
+        except ValueError:
+            return False
+    return str(value) == text
+
+
+def _date(text: str) -> datetime:
+    try:
+        return datetime.combine(date.fromisoformat(text), datetime.min.time(), UTC)
+    except ValueError:
+        raise BadSearch(f"--since {text!r}: write a date such as 2026-01-31") from None
