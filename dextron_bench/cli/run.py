@@ -37,6 +37,8 @@ class Run:
     """The source of reaches."""
     split: tuple[str, ...] = ()
     """The splits to evaluate on; by default all splits that rank methods."""
+    track: tuple[str, ...] = ()
+    """Also evaluate on these splits under tracks, such as delay-100 or sensing-1 (docs/splits.md)."""
     seed: tuple[int, ...] = (0,)
     """Seeds of the agent."""
     record: int = 1
@@ -64,7 +66,7 @@ class Run:
     def _groups(self) -> list[list[plans.Run]]:
         """The runs of each method, one for each seed."""
         from dextron_bench.methods import registry
-        from dextron_bench.runs.plans import Plan, beside_other_code, resolve
+        from dextron_bench.runs.plans import Plan, beside_other_code, resolve, with_tracks
 
         settings = settings_dict(self.settings)
         methods = registry.paper_methods(**settings) if self.all else [(self.method, settings)]
@@ -73,6 +75,7 @@ class Run:
         reaches = self.reaches if self.all else runs[0].source
         floors = [name for name in registry.FLOORS if self.floors and name != self.method]
         runs += [resolve(Plan(name, reaches, self.split)) for name in floors]
+        runs = [with_tracks(run, self.track) for run in runs]
         return [[run.with_seed(seed) for seed in dict.fromkeys(self.seed)] for run in runs]
 
     def _execute(self, groups: list[list[plans.Run]]) -> int:

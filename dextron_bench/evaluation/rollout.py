@@ -7,9 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.perturbation import Perturbation
 from dextron_bench.experts.policies import Case
 from dextron_bench.methods.agents import Agent, AgentCrashed, AgentError, Privileged, as_agent_error
 from dextron_bench.reaches.setting import Source
+from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import DIVERGED, Engine, Step
 
@@ -17,22 +19,30 @@ SLOTS = 256  # Episodes at once. Fixed, because the last bits of an agent's acti
 
 
 def rollout(
-    agent: Agent, source: Source, cases: Sequence[Case], slots: int = SLOTS, threads: int = 0
+    agent: Agent,
+    source: Source,
+    cases: Sequence[Case],
+    slots: int = SLOTS,
+    threads: int = 0,
+    track: Track = PLAIN,
 ) -> Iterator[tuple[int, Episode]]:
-    """Plays every case once; yields (index of the case, episode) in the order in which episodes end.
+    """Plays every case once, under a track; yields (index of the case, episode) in the order in which episodes end.
+
+    An episode has the states and actions of the simulation, not what the agent saw and sent under a track.
 
     Raises AgentError if the agent raises an exception or returns actions of a wrong shape. An action that is not finite
     or lies outside [-1, 1] fails its own episode only, and so does a simulation that diverges; AgentCrashed fails all
     current episodes.
     """
-    return _Evaluation(agent, source, cases, Engine(min(slots, max(len(cases), 1)), threads)).run()
+    return _Evaluation(agent, source, cases, Engine(min(slots, max(len(cases), 1)), threads), track).run()
 
 
 class _Evaluation:
     """Plays one case per slot; a slot gets the next case when its episode ends."""
 
-    def __init__(self, agent: Agent, source: Source, cases: Sequence[Case], engine: Engine) -> None:
+    def __init__(self, agent: Agent, source: Source, cases: Sequence[Case], engine: Engine, track: Track) -> None:
         n = engine.slots
+        self._perturbation = Perturbation(track, n)
         self._agent, self._source, self._cases, self._engine = agent, source, cases, engine
         self._next = 0
         self._case = np.full(n, -1)
@@ -54,8 +64,9 @@ class _Evaluation:
                 continue
             is_valid = np.abs(actions[live, 0]) <= 1.0  # False for NaN.
             valid, invalid = live[is_valid], live[~is_valid]
-            step = self._engine.step(valid, actions[valid])
-            self._store(valid, actions[valid], step)
+            arriving = self._perturbation.delay(actions)[valid]
+            step = self._engine.step(valid, arriving)
+            self._store(valid, arriving, step)
             ended = np.flatnonzero(step.ended & ~step.diverged)
             yield from [self._episode(valid[i], bool(step.terminated[i]), bool(step.truncated[i])) for i in ended]
             yield from [self._episode(slot, failure=DIVERGED) for slot in valid[step.diverged]]
@@ -64,7 +75,7 @@ class _Evaluation:
 
     def _ask(self) -> np.ndarray:
         with as_agent_error("the agent's act()"):
-            actions = np.asarray(self._agent.act(self._now.copy()))
+            actions = np.asarray(self._agent.act(self._perturbation.sense(self._now.copy())))
         if actions.shape != (len(self._now), 1) or actions.dtype.kind != "f":
             raise AgentError(
                 f"act() must return floats of shape ({len(self._now)}, 1) for states of shape {self._now.shape}; "
@@ -84,6 +95,7 @@ class _Evaluation:
         states = self._engine.begin(slots, [self._source.path(case.setting) for case in cases])
         self._states[slots, 0] = self._now[slots] = states
         self._length[slots] = 0
+        self._perturbation.begin(slots, [case.setting for case in cases])
         if isinstance(self._agent, Privileged):
             self._agent.assign(slots, [case.expert for case in cases])
         with as_agent_error("the agent's reset()"):

@@ -11,6 +11,7 @@ from dextron_bench.methods import registry
 from dextron_bench.methods import weights as method_weights
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.registry import Entrant
+from dextron_bench.splits import tracks
 from dextron_bench.splits.loading import ranking_splits
 from dextron_bench.storage import schemas
 from dextron_bench.storage.run_folder import RunFolder, run_folders
@@ -96,6 +97,12 @@ def resolve(plan: Plan) -> Run:
     policy = method.source_policy if isinstance(method, PolicyTransfer) else method
     learner = policy if isinstance(policy, Learner) else None
     return Run(plan, method, learner, registry.label(method), registry.run_source(method, plan.reaches))
+
+
+def with_tracks(run: Run, names: Sequence[str]) -> Run:
+    """The run on its splits, and on each of them under each track; raises UnknownTrack."""
+    added = [tracks.name_of(split, track) for track in names for split in run.splits]
+    return replace(run, plan=replace(run.plan, splits=(*run.splits, *added))) if added else run
 
 
 def beside_other_code(run: Run, runs: Path) -> Run:

@@ -14,6 +14,8 @@ import pandas as pd
 
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches import setting
+from dextron_bench.splits import tracks
+from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.storage import hashing
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
@@ -42,12 +44,13 @@ class DamagedSplit(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """A named list of cases; `digest`, the SHA-256 of its content, is its version."""
+    """A named list of cases; `digest`, the SHA-256 of its content, is its version. It is played on `track`."""
 
     name: str
     reaches: str
     cases: tuple[Case, ...]
     digest: str
+    track: Track = PLAIN
 
     def case(self, row: int) -> Case:
         """The case of a row; raises UnknownRow."""
@@ -75,7 +78,11 @@ def all_splits() -> list[tuple[str, str]]:
 
 
 def load_split(reaches: str, name: str) -> Split:
-    """The shipped split of a name, verified against its hash; raises UnknownSplit, DamagedSplit."""
+    """The shipped split of a name, verified against its hash, perhaps under a track, as in `test+delay-100`.
+
+    Raises UnknownSplit, UnknownTrack, DamagedSplit.
+    """
+    whole_name, (name, track) = name, tracks.parse(name)
     if name not in known_splits(reaches):
         raise UnknownSplit(name, reaches, known_splits(reaches))
     table = _table(reaches)
@@ -88,7 +95,9 @@ def load_split(reaches: str, name: str) -> Split:
         raise DamagedSplit(
             f"split {name!r} of {reaches!r} reaches is damaged (hash {digest[:12]}); reinstall the package"
         )
-    return Split(name, reaches, tuple(cases_from_frame(rows)), digest)
+    if track != PLAIN:
+        digest = hashing.digest(f"{digest} {track}".encode())
+    return Split(whole_name, reaches, tuple(cases_from_frame(rows)), digest, track)
 
 
 def cases_from_frame(rows: pd.DataFrame) -> list[Case]:

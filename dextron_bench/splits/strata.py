@@ -10,6 +10,7 @@ import pandas as pd
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded import parsing
 from dextron_bench.splits.loading import Split, known_splits, load_split
+from dextron_bench.splits.tracks import PLUS
 from dextron_bench.world import task
 
 SUBJECT, REGION = ("subject",), ("ring", "angle")  # What `by_stratum` groups by.
@@ -31,7 +32,7 @@ def strata(split: Split) -> pd.DataFrame:
 
 def shipped_strata(reaches: str, name: str, digest: str) -> pd.DataFrame | None:
     """The strata of a shipped split's rows; None if no split of that name and digest ships. Raises DamagedSplit."""
-    if name not in known_splits(reaches) or (split := load_split(reaches, name)).digest != digest:
+    if name.partition(PLUS)[0] not in known_splits(reaches) or (split := load_split(reaches, name)).digest != digest:
         return None
     return strata(split)
 

@@ -219,6 +219,18 @@ def test_every_configuration_has_a_folder_and_a_row(
     assert len(rows(capsys, "leaderboard", "show")) == 4
 
 
+def test_tracks_are_rows_beside_the_plain_ones(here: Path, capsys: pytest.CaptureFixture[str]):
+    words = ["run", "--method", "exp", *FAST, "--split", "test"]
+    by_split = {row["split"]: row["return"] for row in rows(capsys, *words, "--track", "delay-40", "sensing-2")}
+    assert by_split.keys() == {"test", "test+delay-40", "test+sensing-2"}
+    assert by_split["test"] == 20.0
+    assert [row["split"] for row in rows(capsys, *words)] == ["test"]
+    assert len(rows(capsys, "leaderboard", "show")) == 3
+    capsys.readouterr()
+    assert main.main([*words, "--track", "nix"]) == 2
+    assert "no track 'nix'; choose from delay-40" in capsys.readouterr().err
+
+
 def test_weights_of_a_file_give_the_row_of_its_run(here: Path, capsys: pytest.CaptureFixture[str]):
     trained = rows(capsys, *run(TOY, "--seed", "4"))
     file = here / "runs" / "toy-0.1" / "synthetic" / "seed4" / "weights.safetensors"
