@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table
+from dextron_bench.splits.tracks import PLUS
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from dextron_bench.scores.robustness import Robustness
 
 FRESH = ("fresh [95 %]", "gap [95 %]", "mark")  # Columns of a table in which some row has played fresh settings.
 
@@ -32,10 +37,15 @@ class Show:
         from dextron_bench.runs import result_files
         from dextron_bench.scores import standings
 
-        rows = standings.table(result_files.results(self.runs))
-        print_rows(rows, self.json)
-        if not self.json:
-            print_endings(rows)
+        results = list(result_files.results(self.runs))
+        rows = standings.table(results)
+        if self.json:
+            print_rows(rows, as_json=True)
+            return DONE
+        plain = rows[~rows["split"].str.contains(PLUS, regex=False)] if len(rows) else rows
+        print_rows(plain)
+        print_endings(plain)
+        print_robustness(results)
         return DONE
 
 
@@ -126,6 +136,36 @@ def print_endings(rows: pd.DataFrame) -> None:
         lines = [[row["method"], *cells.cause_shares(row), cells.closing_lag(row)] for row in group.to_dict("records")]
         title = f"how episodes end [%]: {reaches} reaches, split {split}"
         print_table(title, ["method", *CAUSES, "closing lag [s]"], lines)
+
+
+def print_robustness(results: Iterable[dict[str, Any]]) -> None:
+    """Prints mean returns under tracks, and how much lower they are than without, if some were played."""
+    from dextron_bench.scores import robustness
+    from dextron_bench.splits.tracks import TRACKS
+
+    rows = robustness.table(results)
+    for reaches, split in dict.fromkeys((row.reaches, row.split) for row in rows):
+        group = [row for row in rows if (row.reaches, row.split) == (reaches, split)]
+        names = [name for name in TRACKS if any(name in row.returns for row in group)]
+        lines = [
+            [
+                row.method,
+                f"{row.plain:.2f}",
+                *(_under_track(row, name) for name in names),
+                "" if math.isnan(row.area) else f"{row.area:.3f}",
+            ]
+            for row in group
+        ]
+        title = f"tracks: {reaches} reaches, split {split}, mean return and loss [95 %]"
+        print_table(title, ["method", "plain", *names, "area"], lines)
+
+
+def _under_track(row: Robustness, name: str) -> str:
+    """A method's mean return under a track and what it loses there; empty if it did not play it."""
+    if name not in row.returns:
+        return ""
+    loss = row.losses[name]
+    return f"{row.returns[name]:.2f}, loses {loss.mean:.2f} [{loss.low:.2f}, {loss.high:.2f}]"
 
 
 def none_for_nan(value: Any) -> Any:

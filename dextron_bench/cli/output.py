@@ -72,11 +72,13 @@ class _Lines:
 
     def __init__(self, title: str) -> None:
         self._title, self._start = title, time.monotonic()
-        self._printed, self._first = self._start, -1
+        self._printed, self._first, self._last = self._start, -1, -1
 
     def __call__(self, done: int, total: int, note: str = "") -> None:
         now = time.monotonic()
-        self._first = done if self._first < 0 else self._first  # What was done before is not part of the rate.
+        if done < self._last or self._first < 0:  # Other work begins; what was done before is not part of the rate.
+            self._first, self._start = done, now
+        self._last = done
         if now - self._printed < LINE_PERIOD:
             return
         self._printed = now

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,7 +62,9 @@ def noting_failure(attempted: Sequence[RunFolder]) -> Iterator[None]:
     except Exception as error:
         text = " ".join(str(error).split())
         for run in attempted:
-            if run.config.exists():
+            if not run.config.exists():
+                continue
+            with suppress(OSError):  # A full disk, for example, must not hide the error itself.
                 atomic.write_json(run.failure, {"error": f"{type(error).__name__}: {text}"})
         raise
     for run in attempted:
