@@ -104,7 +104,7 @@ class _BranchingRollout:
         some = policies.is_closing(distances, self._first[live], self._largest[live])
         every = policies.is_closing(distances, self._first[live], self._smallest[live])
         for k in np.flatnonzero(some & ~every & (self._length[live] > 0)):
-            self._fork(int(live[k]), distances[k])
+            self._fork(int(live[k]), distances[k : k + 1])
         live = self._live
         states = self._engine.states(live)
         closing = policies.is_closing(task.distance(states), self._first[live], self._largest[live])
@@ -116,11 +116,11 @@ class _BranchingRollout:
         self._live = live[~step.ended]
         return [finished for slot in live[step.ended] for finished in self._finish(slot)]
 
-    def _fork(self, slot: int, distance: float) -> None:
-        """Forks an episode: the experts that close at this distance [m] go on in a slot of their own."""
+    def _fork(self, slot: int, distance: np.ndarray) -> None:
+        """Forks an episode: the experts that close at this distance (1,) [m] go on in a slot of their own."""
         low, high = int(self._low[slot]), int(self._high[slot])
         criticals = self._criticals[self._number[slot]][low:high]
-        middle = low + int(policies.is_closing(distance, self._first[slot], criticals).sum())
+        middle = low + int(policies.is_closing(distance, self._first[[slot]], criticals).sum())
         branch = self._free.pop()
         self._reserved -= 1
         self._engine.fork(np.array([slot]), np.array([branch]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -19,7 +21,7 @@ class NotEmpty(ValueError):
 
 def write(entries: Iterable[Entry], folder: Path) -> int:
     """Writes each seed of each entry as a run; returns the number of runs. Raises NotEmpty, OSError."""
-    if folder.exists() and any(folder.iterdir()):
+    if folder.exists() and os.listdir(folder):
         raise NotEmpty(f"{folder} is not empty; choose another folder with --into")
     experiment = folder / EXPERIMENT
     _write(
@@ -79,6 +81,4 @@ def _write(file: Path, text: str) -> None:
 
 def _yaml(values: Mapping[str, object]) -> str:
     """Values as YAML; JSON's texts and numbers are YAML too."""
-    import json
-
     return "".join(f"{name}: {json.dumps(value)}\n" for name, value in values.items())

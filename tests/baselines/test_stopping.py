@@ -187,10 +187,8 @@ def test_training_learns_to_close_where_closing_succeeds(
     trainer: Callable[..., stopping_trainer.StoppingTrainer], played: Openings
 ):
     learner = trainer(0)
-    before = learner.advance()[0]["stopping_loss"]
-    for _ in range(2):
-        after = learner.advance()[0]["stopping_loss"]
-    assert after < before - 0.1
+    losses = [learner.advance()[0]["stopping_loss"] for _ in range(3)]
+    assert losses[-1] < losses[0] - 0.1
     solvable = [number for number in range(len(played)) if (played.outcomes[played.rows(number)] == SUCCEEDS).any()]
     agent = StoppingAgent(learner.weights()[0])
     scores = [episode.score for _, episode in rollout(agent, SOURCE, [CASES[number] for number in solvable], 2, 1)]

@@ -12,6 +12,7 @@ import threading
 from collections.abc import Callable, Iterator
 from http.client import HTTPConnection, HTTPResponse
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import pytest
@@ -156,18 +157,21 @@ def test_the_server_serves_the_viewer_until_it_is_interrupted():
 
 
 def test_a_client_that_hangs_up_is_no_traceback(
-    server: leaderboard_server.Server, capfd: pytest.CaptureFixture[str], tmp_path: Path
+    server: leaderboard_server.Server,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ):
     """The client resets its connection before it reads a large recording."""
     (tmp_path / "recordings/large.rrd").write_bytes(bytes(30_000_000))
     met = threading.Event()
     original = server.handle_error
 
-    def handle_error(*connection: object) -> None:
+    def handle_error(*connection: Any) -> None:
         original(*connection)
         met.set()
 
-    server.handle_error = handle_error
+    monkeypatch.setattr(server, "handle_error", handle_error)
     client = socket.create_connection((leaderboard_server.LOOPBACK, server.server_port))
     client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # Resets when it is closed.
     client.sendall(f"GET /recordings/large.rrd HTTP/1.1\r\nHost: 127.0.0.1:{server.server_port}\r\n\r\n".encode())

@@ -77,7 +77,9 @@ def test_unfinished_trainings_are_listed_with_the_epochs_left(job: TrainingJob, 
         patched.setattr(ToyTrainer, "advance", killed)
         with pytest.raises(KeyboardInterrupt):
             job.run([0, 3])
-    assert jobs.unfinished(job.runs) == [UnfinishedTraining("toy-0.1", "synthetic", (0, 3), "3 of 5 epochs")]
+    assert jobs.unfinished(job.runs) == [
+        UnfinishedTraining("toy-0.1", "synthetic", (0, 3), "3 of 5 epochs", is_running=False)
+    ]
     job.run([0, 3])
     assert jobs.unfinished(job.runs) == []
 
