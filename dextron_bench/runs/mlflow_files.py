@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from dextron_bench.runs.catalogue import Entry
 from dextron_bench.storage import hashing
+from dextron_bench.storage.folders import visible
 from dextron_bench.world import task
 
 EXPERIMENT, NAME = "1", "dextron-bench"
@@ -21,7 +21,7 @@ class NotEmpty(ValueError):
 
 def write(entries: Iterable[Entry], folder: Path) -> int:
     """Writes each seed of each entry as a run; returns the number of runs. Raises NotEmpty, OSError."""
-    if folder.exists() and os.listdir(folder):
+    if visible(folder, "*"):
         raise NotEmpty(f"{folder} is not empty; choose another folder with --into")
     experiment = folder / EXPERIMENT
     _write(
