@@ -36,16 +36,11 @@ class Doctor:
 
 PACKAGES = (
     *("mujoco", "dm-control", "gymnasium", "numpy", "scipy", "torch", "safetensors"),
-    *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "tyro", "rich"),
+    *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "pillow", "tyro", "rich", "jsonschema", "threadpoolctl"),
 )
-
-
+EXTRAS = {"minari": "minari", "av": "video", "onnxruntime": "onnx"}  # By package: the extra that installs it.
 RENDERERS = ("egl", "osmesa", "glfw")
-
-
 TIMEOUT = 30.0  # [s] for one renderer.
-
-
 RENDER = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 64, 64).render()"
 
 
@@ -71,6 +66,9 @@ def examine() -> Iterator[Finding]:
     yield Finding("python", sys.version_info >= (3, 11), True, platform.python_version())
     for package in PACKAGES:
         yield _package(package)
+    for package, extra in EXTRAS.items():
+        yield _package(package, extra)
+    yield _sandbox()
     yield Finding("processors", True, True, str(os.cpu_count()))
     yield _cuda()
     for name in RENDERERS:
@@ -81,11 +79,21 @@ def examine() -> Iterator[Finding]:
         yield _source(name)
 
 
-def _package(name: str) -> Finding:
+def _package(name: str, extra: str = "") -> Finding:
+    """A package and its version; one of an extra is not needed."""
     try:
-        return Finding(name, True, True, version(name))
+        return Finding(name, True, not extra, version(name))
     except PackageNotFoundError:
-        return Finding(name, False, True, f"not installed; pip install {name}")
+        wanted = f"'dextron-bench[{extra}]'" if extra else name
+        return Finding(name, False, not extra, f"not installed; pip install {wanted}")
+
+
+def _sandbox() -> Finding:
+    from dextron_bench.methods.isolation import sandbox
+
+    if sandbox.is_available():
+        return Finding("bubblewrap", True, False, "agents of strangers run in a sandbox")
+    return Finding("bubblewrap", False, False, "without this sandbox, agents of strangers run only with --trust")
 
 
 def _cuda() -> Finding:
