@@ -64,7 +64,11 @@ class Verify:
     def __call__(self) -> int:
         from dextron_bench.leaderboard import verify_board
 
-        if self.all == (self.bundle is not None):
+        if self.all and self.bundle is not None:
+            raise verify_board.NothingToVerify(
+                f"--all verifies the leaderboard's own rows: leave out {self.bundle}, or leave out --all"
+            )
+        if not self.all and self.bundle is None:
             raise verify_board.NothingToVerify("give a submission, or --all for the leaderboard's own rows")
         if self.bundle is None:
             return self._verify_board()

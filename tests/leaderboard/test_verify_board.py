@@ -151,3 +151,8 @@ def test_an_invalid_submission_is_refused_with_the_reason(submitted: Path, capsy
         assert reason in capsys.readouterr().err
     assert main.main(["leaderboard", "verify"]) == 2
     assert "give a submission, or --all" in capsys.readouterr().err
+
+
+def test_a_submission_and_all_rows_are_not_verified_at_once(capsys: pytest.CaptureFixture[str]):
+    assert main.main(["leaderboard", "verify", "mine.zip", "--all"]) == 2
+    assert "leave out mine.zip, or leave out --all" in capsys.readouterr().err
