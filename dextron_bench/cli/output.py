@@ -77,7 +77,7 @@ class _Lines:
     def __call__(self, done: int, total: int, note: str = "") -> None:
         now = time.monotonic()
         if done < self._last or self._first < 0:  # Other work begins; what was done before is not part of the rate.
-            self._first, self._start = done, now
+            self._first, self._start, self._printed = done, now, now
         self._last = done
         if now - self._printed < LINE_PERIOD:
             return

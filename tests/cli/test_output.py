@@ -74,7 +74,7 @@ def test_without_a_terminal_a_line_each_minute_says_what_is_done_and_left(
         for at, done in (*((1030.0, 105), (1059.0, 109), (1120.0, 120)), *((1150.0, 125), (1180.0, 130))):
             now = at
             progress(done, 400, "val 3.1")
-        for at, done in ((1181.0, 0), (1241.0, 60)):  # Other work begins.
+        for at, done in ((1250.0, 0), (1310.0, 60)):  # Other work begins.
             now = at
             progress(done, 400)
     assert capsys.readouterr() == (
