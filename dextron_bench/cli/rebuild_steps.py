@@ -46,6 +46,17 @@ def _splits(reaches: str) -> Step:
     return Step(f"splits-{reaches}", (command,), needs, (f"{DATA}/splits-{reaches}.parquet",))
 
 
+def _bottles(reaches: str) -> Step:
+    """The splits under the tracks that change the bottle."""
+    command = f"splits --reaches {reaches} --bottles --into {DATA} --runs {{runs}}"
+    return Step(
+        f"bottles-{reaches}",
+        (command,),
+        (f"{DATA}/splits-{reaches}.parquet",),
+        (f"{DATA}/bottles-{reaches}.parquet",),
+    )
+
+
 def _run(label: str, method: str, reaches: str, seeds: str = "0", needs: tuple[str, ...] = ()) -> Step:
     """A run of a method on all splits that rank methods, with its training."""
     command = f"run --method {method} --reaches {reaches} --seed {seeds} --no-floors --runs {{runs}}"
@@ -82,6 +93,7 @@ STEPS: tuple[Step, ...] = (
     _search("real", 10_000),
     _search("synthetic", 6_000),
     *map(_splits, ("real", "synthetic", "minjerk")),
+    *map(_bottles, ("real", "synthetic")),
     *(_run(name, name, reaches) for reaches in ("real", "synthetic") for name in RULES),
     *(_run(name, name, "minjerk") for name in ("nothing", "random")),
     _run("sim-0.1", "sim", "minjerk", SEEDS),

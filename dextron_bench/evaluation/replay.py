@@ -10,6 +10,7 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches.setting import Setting, Source
+from dextron_bench.world.bottle import Bottle
 
 UNUSED = Expert(1.0, 0.0)  # The expert of a case in which no expert acts.
 
@@ -37,8 +38,12 @@ class Script:
 
 
 def replay(
-    source: Source, settings: Sequence[Setting], actions: Sequence[np.ndarray], threads: int = 0
+    source: Source,
+    settings: Sequence[Setting],
+    actions: Sequence[np.ndarray],
+    threads: int = 0,
+    bottles: Sequence[Bottle] = (),
 ) -> Iterator[tuple[int, Episode]]:
-    """Plays every setting with its actions (T,); yields (index, episode) as episodes end."""
+    """Plays every setting, perhaps with a bottle, with its actions (T,); yields (index, episode) as episodes end."""
     cases = [Case(setting, UNUSED, 0.0) for setting in settings]
-    return rollout(Script(actions), source, cases, threads=threads)
+    return rollout(Script(actions), source, cases, threads=threads, bottles=bottles)

@@ -13,6 +13,7 @@ from dextron_bench.methods.agents import Agent, AgentCrashed, AgentError, Privil
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.world import model, task
+from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.engine import DIVERGED, Engine, Step
 
 SLOTS = 256  # Episodes at once. Fixed, because the last bits of an agent's actions may depend on the batch size.
@@ -25,23 +26,35 @@ def rollout(
     slots: int = SLOTS,
     threads: int = 0,
     track: Track = PLAIN,
+    bottles: Sequence[Bottle] = (),
 ) -> Iterator[tuple[int, Episode]]:
     """Plays every case once, under a track; yields (index of the case, episode) in the order in which episodes end.
 
-    An episode has the states and actions of the simulation, not what the agent saw and sent under a track.
+    `bottles` has one for each case; without it, all have the model's bottle. An episode has the states and actions of
+    the simulation, not what the agent saw and sent under a track.
 
     Raises AgentError if the agent raises an exception or returns actions of a wrong shape. An action that is not finite
     or lies outside [-1, 1] fails its own episode only, and so does a simulation that diverges; AgentCrashed fails all
     current episodes.
     """
-    return _Evaluation(agent, source, cases, Engine(min(slots, max(len(cases), 1)), threads), track).run()
+    engine = Engine(min(slots, max(len(cases), 1)), threads)
+    return _Evaluation(agent, source, cases, engine, track, bottles).run()
 
 
 class _Evaluation:
     """Plays one case per slot; a slot gets the next case when its episode ends."""
 
-    def __init__(self, agent: Agent, source: Source, cases: Sequence[Case], engine: Engine, track: Track) -> None:
+    def __init__(
+        self,
+        agent: Agent,
+        source: Source,
+        cases: Sequence[Case],
+        engine: Engine,
+        track: Track,
+        bottles: Sequence[Bottle],
+    ) -> None:
         n = engine.slots
+        self._bottles = bottles
         self._perturbation = Perturbation(track, n)
         self._agent, self._source, self._cases, self._engine = agent, source, cases, engine
         self._next = 0
@@ -90,9 +103,10 @@ class _Evaluation:
         if not slots.size:
             return
         cases = self._cases[self._next : self._next + len(slots)]
+        bottles = self._bottles[self._next : self._next + len(slots)]
         self._case[slots] = self._next + np.arange(len(slots))
         self._next += len(slots)
-        states = self._engine.begin(slots, [self._source.path(case.setting) for case in cases])
+        states = self._engine.begin(slots, [self._source.path(case.setting) for case in cases], bottles)
         self._states[slots, 0] = self._now[slots] = states
         self._length[slots] = 0
         self._perturbation.begin(slots, [case.setting for case in cases])

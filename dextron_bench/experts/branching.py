@@ -15,16 +15,21 @@ import numpy as np
 from dextron_bench.experts import policies
 from dextron_bench.reaches.reach import Path
 from dextron_bench.world import task
+from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.engine import Engine
 
 
 @dataclass(frozen=True, slots=True)
 class ExpertBatch:
-    """Experts to play along one path: their common gain K, and their critical distances d_c (m,)."""
+    """Experts to play along one path: their common gain K, and their critical distances d_c (m,).
+
+    Without a `bottle` they meet the model's.
+    """
 
     path: Path
     gain: float
     criticals: np.ndarray
+    bottle: Bottle | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +86,7 @@ class _BranchingRollout:
     def _begin(self, number: int, batch: ExpertBatch) -> None:
         count = len(batch.criticals)
         slot = self._free.pop()
-        state = self._engine.begin(np.array([slot]), [batch.path])
+        state = self._engine.begin(np.array([slot]), [batch.path], [batch.bottle] if batch.bottle else ())
         self._live = np.append(self._live, slot)
         self._reserved += count - 1
         ranks = np.argsort(-batch.criticals, kind="stable")

@@ -12,6 +12,7 @@ import pandas as pd
 
 from dextron_bench.experts import branching
 from dextron_bench.reaches import setting
+from dextron_bench.world import bottle
 from dextron_bench.world.engine import Engine
 
 
@@ -46,11 +47,13 @@ def play_blocks(
 
 
 def batches(source: setting.Source, draws: pd.DataFrame, experts_per_setting: int) -> Iterator[branching.ExpertBatch]:
-    """One batch per setting: each `experts_per_setting` consecutive rows share one."""
+    """One batch per setting: each `experts_per_setting` consecutive rows share one, and its bottle if they have any."""
     gains, criticals = draws["gain"].to_numpy(), draws["critical"].to_numpy()
     firsts = range(0, len(draws), experts_per_setting)
-    for i, case in zip(firsts, setting.from_frame(draws.iloc[::experts_per_setting]), strict=True):
-        yield branching.ExpertBatch(source.path(case), gains[i], criticals[i : i + experts_per_setting])
+    once = draws.iloc[::experts_per_setting]
+    bottles = bottle.from_frame(once) or [None] * len(once)
+    for i, case, one in zip(firsts, setting.from_frame(once), bottles, strict=True):
+        yield branching.ExpertBatch(source.path(case), gains[i], criticals[i : i + experts_per_setting], one)
 
 
 @dataclass(slots=True)

@@ -71,7 +71,9 @@ def _rerun_split(
 ) -> int:
     """Runs the agent on rows of a split and adds the differences; returns how many rows it played in the end."""
     source, cases = sources.open_source(split.reaches), [split.cases[row] for row in rows]
-    episodes = dict(rollout(agent_of(run, result), source, cases, threads=threads, track=split.track))
+    bottles = split.bottles_of(rows)
+    agent = agent_of(run, result)
+    episodes = dict(rollout(agent, source, cases, threads=threads, track=split.track, bottles=bottles))
     table = pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
     computed, whole = result_files.scores_by_split(table)[split.name], len(rows) == len(split.cases)
     differences = list(_differences(result["splits"][split.name], computed, rows, whole))

@@ -58,7 +58,7 @@ def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progre
     copy = run_files.copy_weights(weights_file, folder) if weights_file else None
 
     def play(split: Split) -> Played:
-        return rollout(agent(run, copy), source, split.cases, threads=threads, track=split.track)
+        return rollout(agent(run, copy), source, split.cases, threads=threads, track=split.track, bottles=split.bottles)
 
     episodes = evaluate(folder, source, splits, play, run.plan.record, run.about, report)
     about = run.about | _training_facts(run, copy) | ({"privileged": "each setting's expert"} if privileged else {})

@@ -11,8 +11,7 @@ from dextron_bench.methods import registry
 from dextron_bench.methods import weights as method_weights
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.registry import Entrant
-from dextron_bench.splits import tracks
-from dextron_bench.splits.loading import ranking_splits
+from dextron_bench.splits.loading import ranking_splits, splits_under
 from dextron_bench.storage import schemas
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.training.jobs import TrainingJob
@@ -100,8 +99,8 @@ def resolve(plan: Plan) -> Run:
 
 
 def with_tracks(run: Run, names: Sequence[str]) -> Run:
-    """The run on its splits, and on each of them under each track; raises UnknownTrack."""
-    added = [tracks.name_of(split, track) for track in names for split in run.splits]
+    """The run on its splits, and on each of them under each track; raises UnknownTrack, UnknownSplit."""
+    added = [name for track in names for name in splits_under(run.source, run.splits, track)]
     return replace(run, plan=replace(run.plan, splits=(*run.splits, *added))) if added else run
 
 

@@ -84,7 +84,8 @@ def _record(group: pd.DataFrame) -> Iterator[None]:
     run, reaches = RunFolder(Path(rows[0]["folder"])), rows[0]["reaches"]
     source, split = sources.open_source(reaches), load_split(reaches, rows[0]["split"])
     about = selection.run_identity(run)
-    for place, episode in replay(source, from_frame(group), group["actions"].tolist()):
+    bottles = split.bottles_of(row["row"] for row in rows)
+    for place, episode in replay(source, from_frame(group), group["actions"].tolist(), bottles=bottles):
         row = rows[place]
         recording_files.record(run, source, split, row["row"], _as_recorded(row, episode), about)
         yield

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import as_file, files
@@ -17,6 +17,8 @@ from dextron_bench.reaches import setting
 from dextron_bench.splits import tracks
 from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.storage import hashing
+from dextron_bench.world import bottle
+from dextron_bench.world.bottle import Bottle
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
 SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "hard", "open")
@@ -44,19 +46,27 @@ class DamagedSplit(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """A named list of cases; `digest`, the SHA-256 of its content, is its version. It is played on `track`."""
+    """A named list of cases; `digest`, the SHA-256 of its content, is its version. It is played on `track`.
+
+    `bottles` has one for each case, or none if all have the model's.
+    """
 
     name: str
     reaches: str
     cases: tuple[Case, ...]
     digest: str
     track: Track = PLAIN
+    bottles: tuple[Bottle, ...] = ()
 
     def case(self, row: int) -> Case:
         """The case of a row; raises UnknownRow."""
         if not 0 <= row < len(self.cases):
             raise UnknownRow(f"{self.name} of {self.reaches} reaches has rows 0 to {len(self.cases) - 1}, not {row}")
         return self.cases[row]
+
+    def bottles_of(self, rows: Iterable[int]) -> list[Bottle]:
+        """The bottles of some rows; empty if all have the model's."""
+        return [self.bottles[row] for row in rows] if self.bottles else []
 
 
 def known_splits(reaches: str) -> tuple[str, ...]:
@@ -83,9 +93,45 @@ def load_split(reaches: str, name: str) -> Split:
     Raises UnknownSplit, UnknownTrack, DamagedSplit.
     """
     whole_name, (name, track) = name, tracks.parse(name)
+    if track.bottle is not None:
+        return _load_with_bottles(reaches, whole_name, track)
     if name not in known_splits(reaches):
         raise UnknownSplit(name, reaches, known_splits(reaches))
-    table = _table(reaches)
+    rows, digest = _rows(_table(f"splits-{reaches}.parquet"), reaches, name)
+    if track != PLAIN:
+        digest = hashing.digest(f"{digest} {track}".encode())
+    return Split(whole_name, reaches, tuple(cases_from_frame(rows)), digest, track)
+
+
+def splits_under(reaches: str, names: Sequence[str], track: str) -> list[str]:
+    """Names of some splits under a track; only `test` has other bottles. Raises UnknownTrack, UnknownSplit."""
+    under = [tracks.name_of(name, track) for name in names]
+    if tracks.TRACKS[track].bottle is None:
+        return under
+    known = _splits_with_bottles(reaches)
+    if not set(under) & set(known):
+        raise UnknownSplit(under[0], reaches, known)
+    return [name for name in under if name in known]
+
+
+def bottles_file(reaches: str) -> str:
+    """The name of the table of a source's splits with other bottles."""
+    return f"bottles-{reaches}.parquet"
+
+
+def _load_with_bottles(reaches: str, name: str, track: Track) -> Split:
+    if name not in (known := _splits_with_bottles(reaches)):
+        raise UnknownSplit(name, reaches, known)
+    rows, digest = _rows(_table(bottles_file(reaches)), reaches, name)
+    return Split(name, reaches, tuple(cases_from_frame(rows)), digest, track, tuple(bottle.from_frame(rows)))
+
+
+def _splits_with_bottles(reaches: str) -> list[str]:
+    return [name for name in _catalogue().get(reaches, {}) if tracks.PLUS in name]
+
+
+def _rows(table: pd.DataFrame, reaches: str, name: str) -> tuple[pd.DataFrame, str]:
+    """The rows of a split, and their hash; raises DamagedSplit if it is not the hash of the catalogue."""
     try:
         rows = table[table["split"] == name]
         digest, expected = split_digest(rows), _catalogue()[reaches][name]["digest"]
@@ -95,9 +141,7 @@ def load_split(reaches: str, name: str) -> Split:
         raise DamagedSplit(
             f"split {name!r} of {reaches!r} reaches is damaged (hash {digest[:12]}); reinstall the package"
         )
-    if track != PLAIN:
-        digest = hashing.digest(f"{digest} {track}".encode())
-    return Split(whole_name, reaches, tuple(cases_from_frame(rows)), digest, track)
+    return rows, digest
 
 
 def cases_from_frame(rows: pd.DataFrame) -> list[Case]:
@@ -110,9 +154,13 @@ def cases_from_frame(rows: pd.DataFrame) -> list[Case]:
 
 
 def split_digest(rows: pd.DataFrame) -> str:
-    """SHA-256 of a split's rows in order: names of reaches as UTF-8, numbers as little-endian float64."""
+    """SHA-256 of a split's rows in order: names of reaches as UTF-8, numbers as little-endian float64.
+
+    The numbers are NUMBERS, and the columns of the bottles if the rows have them.
+    """
     names = "\n".join(rows["reach"]).encode()
-    return hashing.digest(names, *(np.ascontiguousarray(rows[c], "<f8").tobytes() for c in NUMBERS))
+    numbers = [*NUMBERS, *(name for name in bottle.COLUMNS if name in rows)]
+    return hashing.digest(names, *(np.ascontiguousarray(rows[c], "<f8").tobytes() for c in numbers))
 
 
 @cache
@@ -124,9 +172,9 @@ def _catalogue() -> dict[str, dict[str, Any]]:
 
 
 @cache
-def _table(reaches: str) -> pd.DataFrame:
-    with as_file(files("dextron_bench.data").joinpath(f"splits-{reaches}.parquet")) as file:
+def _table(name: str) -> pd.DataFrame:
+    with as_file(files("dextron_bench.data").joinpath(name)) as file:
         try:
             return pd.read_parquet(file)
         except (OSError, ValueError) as error:
-            raise DamagedSplit(f"the splits of {reaches!r} reaches cannot be read; reinstall the package") from error
+            raise DamagedSplit(f"{name} cannot be read; reinstall the package") from error

@@ -13,7 +13,7 @@ from dextron_bench.experts import blocks, outcomes, policies
 from dextron_bench.reaches import setting
 from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.storage import tables
-from dextron_bench.world import task
+from dextron_bench.world import bottle, task
 from dextron_bench.world.engine import Engine
 
 RANGE = policies.CRITICAL_DISTANCE[1] - policies.CRITICAL_DISTANCE[0]  # Width of the range of d_c.
@@ -40,7 +40,8 @@ class Scanner:
     def play(self, rows: pd.DataFrame, criticals: np.ndarray) -> np.ndarray:
         """Sums of rewards (rows, points) of experts with each row's gain and critical distances (rows, points)."""
         points = criticals.shape[1]
-        draws = rows[DRAW].loc[rows.index.repeat(points)].reset_index(drop=True).assign(critical=criticals.ravel())
+        columns = [name for name in (*DRAW, *bottle.COLUMNS) if name in rows]
+        draws = rows[columns].loc[rows.index.repeat(points)].reset_index(drop=True).assign(critical=criticals.ravel())
         parts = [draws.iloc[first : first + BLOCK * points] for first in range(0, len(draws), BLOCK * points)]
         scores = [self._stored(part) for part in parts]
         missing = ((k, part) for k, part in enumerate(parts) if scores[k] is None)

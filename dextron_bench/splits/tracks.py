@@ -29,21 +29,37 @@ class Noise:
 
 
 @dataclass(frozen=True, slots=True)
+class Range:
+    """A quantity of the bottle that differs from row to row: `mass` [kg], `friction` or `radius` [m], and its range."""
+
+    quantity: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
 class Track:
-    """A condition: actions arrive `delay` control steps late, and states have `noise`."""
+    """A condition: actions arrive `delay` control steps late, states have `noise`, or each row has its own `bottle`."""
 
     name: str = ""
     delay: int = 0
     noise: Noise | None = None
+    bottle: Range | None = None
 
 
 PLAIN = Track()
 DEGREE = 0.017453292519943295  # [rad]
 DELAYS = {40: 2, 100: 5, 200: 10, 300: 15}  # Control steps by their duration [ms].
+BOTTLES = {
+    "bottle-mass": Track("bottle-mass", bottle=Range("mass", 0.25, 1.0)),
+    "bottle-friction": Track("bottle-friction", bottle=Range("friction", 0.5, 1.5)),
+    "bottle-radius": Track("bottle-radius", bottle=Range("radius", 0.020, 0.032)),
+}
 TRACKS = {
     **{f"delay-{duration}": Track(f"delay-{duration}", delay=steps) for duration, steps in DELAYS.items()},
     "sensing-1": Track("sensing-1", noise=Noise(0.002, 0.5 * DEGREE, 0.5 * DEGREE, 0.02, 0.1, 0.01)),
     "sensing-2": Track("sensing-2", noise=Noise(0.005, 2.0 * DEGREE, 2.0 * DEGREE, 0.05, 0.3, 0.05)),
+    **BOTTLES,
 }
 
 

@@ -12,6 +12,8 @@ from mujoco.batch import Batch
 
 from dextron_bench.reaches.reach import PALM_AHEAD, Path
 from dextron_bench.world import model, task
+from dextron_bench.world.bottle import Bottle
+from dextron_bench.world.bottles import Bottles, model_bottle
 
 STATE_BOUND = 1e10  # Above this, MuJoCo declares a simulation unstable.
 DIVERGED = "the simulation diverged"  # The failure of such an episode.
@@ -47,6 +49,7 @@ class Engine:
     def __init__(self, slots: int, threads: int = 0) -> None:
         """Allocates `slots` slots that step on `threads` threads (0: one per processor)."""
         self._threads, self._batch = threads, Batch(model.load(), slots, threads)
+        self._bottles: Bottles | None = None  # Only if a bottle was ever given: other episodes pay nothing.
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         self._ctrl = self._batch.bind("ctrl")
         self._mocap_pos = self._batch.bind("mocap_pos")
@@ -63,8 +66,12 @@ class Engine:
         """Number of slots."""
         return len(self._qpos)
 
-    def begin(self, ids: np.ndarray, paths: Sequence[Path]) -> np.ndarray:
-        """Begins an episode along a path in each slot of `ids` (n,), and returns the first states (n, 48)."""
+    def begin(self, ids: np.ndarray, paths: Sequence[Path], bottles: Sequence[Bottle] = ()) -> np.ndarray:
+        """Begins an episode along a path in each slot of `ids` (n,), and returns the first states (n, 48).
+
+        Without `bottles`, one for each slot, the episodes have the model's bottle.
+        """
+        self._set_bottles(ids, bottles)
         self._batch.warning[ids] = 0
         lengths = np.array([len(path) for path in paths])
         for slot, path in zip(ids, paths, strict=True):
@@ -80,6 +87,12 @@ class Engine:
         states = self.states(ids)
         self._progress.begin(ids, states, lengths)
         return states
+
+    def _set_bottles(self, ids: np.ndarray, bottles: Sequence[Bottle]) -> None:
+        if bottles and self._bottles is None:
+            self._bottles = Bottles(self._batch)
+        if self._bottles is not None and len(ids):
+            self._bottles.set(ids, bottles or [model_bottle()] * len(ids))
 
     def states(self, ids: np.ndarray) -> np.ndarray:
         """A copy of the states (n, 48) of slots `ids` (n,)."""
@@ -113,6 +126,8 @@ class Engine:
         for rows in (self._batch.state, self._batch.warning, self._positions, self._quaternions):
             rows[target] = rows[source]
         self._progress.copy(source, target)
+        if self._bottles is not None:
+            self._bottles.copy(source, target)
 
     def save(self, ids: np.ndarray) -> dict[str, np.ndarray]:
         """Copies of everything that the episodes in slots `ids` (n,) need to continue, except their paths."""

@@ -70,6 +70,13 @@ def initial_qpos() -> np.ndarray:
 
 
 @cache
+def bottle_indices() -> tuple[int, int, int]:
+    """Indices of the bottle's body and geom, and of its bounding box in `bvh_aabb`."""
+    body = load().body("bottle").id
+    return body, load().geom("bottle").id, int(load().body_bvhadr[body])
+
+
+@cache
 def state_names() -> tuple[str, ...]:
     """Names of the 48 numbers in a state: positions, then velocities.
 

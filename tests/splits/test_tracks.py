@@ -15,7 +15,8 @@ def test_a_delay_lasts_as_long_as_its_name_says():
         kind, _, number = name.partition("-")
         assert track.name == name
         assert track.delay * CONTROL_STEP * 1000 == pytest.approx(float(number) if kind == "delay" else 0.0)
-        assert (track.noise is None) == (kind == "delay")
+        assert (track.noise is not None) == (kind == "sensing")
+        assert (track.bottle.quantity if track.bottle else "") == (number if kind == "bottle" else "")
 
 
 def test_a_split_under_a_track_has_its_cases_and_a_version_of_its_own():
