@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 DATA = "dextron_bench/data"
 SPLITS = f"{DATA}/splits*"
@@ -64,6 +64,15 @@ def _run(label: str, method: str, reaches: str, seeds: str = "0", needs: tuple[s
     return Step(name, (command,), (f"{DATA}/splits-{reaches}.parquet", *needs), publishes=(name,))
 
 
+def _experts(reaches: str, subjects: str = "") -> Step:
+    """EXP on every split: it shows which rows have an expert that scores 20."""
+    splits = f"train val test unseen-reach {subjects} hard open"
+    return replace(
+        _run("exp", "exp", reaches),
+        commands=(f"run --method exp --reaches {reaches} --split {splits} --no-floors --runs {{runs}}",),
+    )
+
+
 LEARNERS = {  # By label: the flags of the method.
     "bc": "bc",
     "rl": "rl",
@@ -72,7 +81,7 @@ LEARNERS = {  # By label: the flags of the method.
     "rlil-0.3": "rlil --dur 0.3",
     "rlil-0.3-2q": "rlil --dur 0.3 --critics 2",
 }
-RULES = ("exp", "reflex", "nothing", "random")
+RULES = ("reflex", "nothing", "random")
 SIM = f"{WEIGHTS}/sim-0.1/minjerk/*"
 
 
@@ -94,6 +103,8 @@ STEPS: tuple[Step, ...] = (
     _search("synthetic", 6_000),
     *map(_splits, ("real", "synthetic", "minjerk")),
     *map(_bottles, ("real", "synthetic")),
+    _experts("real", "unseen-subject"),
+    _experts("synthetic"),
     *(_run(name, name, reaches) for reaches in ("real", "synthetic") for name in RULES),
     *(_run(name, name, "minjerk") for name in ("nothing", "random")),
     _run("sim-0.1", "sim", "minjerk", SEEDS),

@@ -97,7 +97,7 @@ def load_split(reaches: str, name: str) -> Split:
         return _load_with_bottles(reaches, whole_name, track)
     if name not in known_splits(reaches):
         raise UnknownSplit(name, reaches, known_splits(reaches))
-    rows, digest = _rows(_table(f"splits-{reaches}.parquet"), reaches, name)
+    rows, digest = _rows(_table(reaches, f"splits-{reaches}.parquet"), reaches, name)
     if track != PLAIN:
         digest = hashing.digest(f"{digest} {track}".encode())
     return Split(whole_name, reaches, tuple(cases_from_frame(rows)), digest, track)
@@ -122,7 +122,7 @@ def bottles_file(reaches: str) -> str:
 def _load_with_bottles(reaches: str, name: str, track: Track) -> Split:
     if name not in (known := _splits_with_bottles(reaches)):
         raise UnknownSplit(name, reaches, known)
-    rows, digest = _rows(_table(bottles_file(reaches)), reaches, name)
+    rows, digest = _rows(_table(reaches, bottles_file(reaches)), reaches, name)
     return Split(name, reaches, tuple(cases_from_frame(rows)), digest, track, tuple(bottle.from_frame(rows)))
 
 
@@ -172,9 +172,9 @@ def _catalogue() -> dict[str, dict[str, Any]]:
 
 
 @cache
-def _table(name: str) -> pd.DataFrame:
+def _table(reaches: str, name: str) -> pd.DataFrame:
     with as_file(files("dextron_bench.data").joinpath(name)) as file:
         try:
             return pd.read_parquet(file)
         except (OSError, ValueError) as error:
-            raise DamagedSplit(f"{name} cannot be read; reinstall the package") from error
+            raise DamagedSplit(f"the splits of {reaches!r} reaches cannot be read; reinstall the package") from error

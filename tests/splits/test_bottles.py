@@ -91,7 +91,7 @@ def test_the_tables_are_read_as_splits(tmp_path: Path, monkeypatch: pytest.Monke
     catalogue = json.loads((tmp_path / "splits.json").read_text())
     assert catalogue == {"synthetic": {"test": {"rows": 40}, **entries}, "real": {}}
     monkeypatch.setattr(loading, "_catalogue", lambda: catalogue)
-    monkeypatch.setattr(loading, "_table", lambda name: pd.read_parquet(tmp_path / name))
+    monkeypatch.setattr(loading, "_table", lambda _, name: pd.read_parquet(tmp_path / name))
     split = loading.load_split("synthetic", "test+bottle-radius")
     assert len(split.bottles) == len(split.cases) == 40
     assert split.track.name == "bottle-radius"
@@ -101,6 +101,6 @@ def test_the_tables_are_read_as_splits(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(loading.UnknownSplit, match=r"choose from test\+bottle-friction"):
         loading.load_split("synthetic", "hard+bottle-mass")
     changed = pd.read_parquet(tmp_path / "bottles-synthetic.parquet").assign(mass=0.3)
-    monkeypatch.setattr(loading, "_table", lambda name: changed)
+    monkeypatch.setattr(loading, "_table", lambda *_: changed)
     with pytest.raises(loading.DamagedSplit):
         loading.load_split("synthetic", "test+bottle-mass")

@@ -13,6 +13,7 @@ from dextron_bench.leaderboard import highlights
 from dextron_bench.leaderboard.highlights import Shown
 from dextron_bench.leaderboard.page import heatmaps as page_heatmaps
 from dextron_bench.leaderboard.page import svg
+from dextron_bench.leaderboard.page import tracks as page_tracks
 from dextron_bench.leaderboard.page.html import UNKNOWN, Html, join, tag
 from dextron_bench.scores import cells
 from dextron_bench.splits.loading import EVALUATED
@@ -56,6 +57,12 @@ def heatmaps(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> Iterator[
             methods = [method for method in dict.fromkeys(group["method"]) if method in table]
             maps = [_scrollable(content, f"Success, {name}") for content in page_heatmaps.maps(table, methods, name)]
             yield tag("div", *maps, data_reaches=reaches, data_split=split)
+
+
+def tracks(results: Iterable[dict[str, Any]]) -> Iterator[Html]:
+    """Mean returns under tracks, methods by tracks."""
+    for reaches, split, title, matrix in page_tracks.matrices(results):
+        yield tag("div", _scrollable(matrix, title), data_reaches=reaches, data_split=split)
 
 
 def ridges(folder: Path, shown: Sequence[Shown]) -> Iterator[Html]:
