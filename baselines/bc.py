@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -62,8 +62,7 @@ class Cloning:
         rows = demos.transitions()
         self._mean = demos.states[rows].mean(axis=0, dtype=np.float64)
         self._deviation = np.sqrt(demos.states[rows].var(axis=0, dtype=np.float64) + EPSILON)
-        scaled = np.clip((demos.states[rows] - self._mean) / self._deviation, -CLIP, CLIP)
-        self._states = torch.tensor(scaled, dtype=torch.float32, device=device)
+        self._states = self._scaled(demos.states[rows])
         self._actions = torch.tensor(demos.actions[rows, None], dtype=torch.float32, device=device)
         self._network = Stack.make(policy.STATE, 2, [np.random.default_rng([seed, 0]) for seed in seeds], device)
         self._optimiser = torch.optim.Adam(self._network.parameters, lr=LEARNING_RATE, fused=True)
@@ -72,17 +71,30 @@ class Cloning:
         """Trains for one epoch of STEPS updates; returns each seed's mean loss."""
         for group in self._optimiser.param_groups:
             group["lr"] = LEARNING_RATE * 0.5 ** (self.epoch // HALVED_EVERY)
-        size = (STEPS, BATCH)
-        draws = [np.random.default_rng([s, 1, self.epoch]).integers(len(self._states), size=size) for s in self._seeds]
-        rows = torch.tensor(np.stack(draws, axis=1), device=self._device)
-        losses = torch.stack([self._update(rows[t]) for t in range(STEPS)]).mean(dim=0)
+        losses = torch.stack([self._update(*batch) for batch in self._batches()]).mean(dim=0)
         self.epoch += 1
         return [{"imitation_loss": loss} for loss in losses.double().tolist()]
 
-    def _update(self, rows: Tensor) -> Tensor:
-        """One gradient step of every network on demonstrations `rows` (S, BATCH); returns losses (S,)."""
-        mean, _ = policy.head(self._network(self._states[rows]))
-        losses = imitation_loss(mean, self._actions[rows])
+    def _batches(self) -> Iterator[tuple[Tensor, Tensor]]:
+        """The STEPS batches of an epoch: scaled states (S, BATCH, 48) and the experts' actions (S, BATCH, 1)."""
+        for rows in self._drawn(1, len(self._states), BATCH):
+            yield self._states[rows], self._actions[rows]
+
+    def _drawn(self, stream: int, count: int, size: int) -> Tensor:
+        """Numbers (STEPS, S, size) below `count`, from one stream of each seed."""
+        streams = [np.random.default_rng([seed, stream, self.epoch]) for seed in self._seeds]
+        draws = [rng.integers(count, size=(STEPS, size)) for rng in streams]
+        return torch.tensor(np.stack(draws, axis=1), device=self._device)
+
+    def _scaled(self, states: np.ndarray) -> Tensor:
+        """Scaled states (..., 48)."""
+        scaled = np.clip((states - self._mean) / self._deviation, -CLIP, CLIP)
+        return torch.tensor(scaled, dtype=torch.float32, device=self._device)
+
+    def _update(self, states: Tensor, actions: Tensor) -> Tensor:
+        """One gradient step of every network on states (S, B, 48) and actions (S, B, 1); returns losses (S,)."""
+        mean, _ = policy.head(self._network(states))
+        losses = imitation_loss(mean, actions)
         self._optimiser.zero_grad(set_to_none=True)
         losses.sum().backward()
         self._optimiser.step()

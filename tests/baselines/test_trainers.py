@@ -11,6 +11,7 @@ import torch
 from baselines import cycle, stopping_trainer
 from baselines.bc import Cloning, imitation_loss
 from baselines.cycle import Cycle
+from baselines.dagger import Aggregation
 from baselines.demonstrations import load
 from baselines.policy import MeanAgent
 from baselines.schedule import Exploration, Schedule
@@ -21,14 +22,15 @@ from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 SCHEDULE = Schedule(epochs=4, warm_start=60, period=1)
-KINDS = ("rl", "held", "rlil", "bc", "stopping")
+KINDS = ("rl", "held", "rlil", "bc", "dagger", "stopping")
 
 
 @pytest.fixture(autouse=True)
 def short_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Shortens epochs to 80 frames, or to 5 updates of BC or STOPPING."""
+    """Shortens epochs to 80 frames, 2 episodes, or 5 updates of BC, DAGGER or STOPPING."""
     monkeypatch.setattr(cycle, "FRAMES", 80)
     monkeypatch.setattr("baselines.bc.STEPS", 5)
+    monkeypatch.setattr("baselines.dagger.EPISODES", 2)
     monkeypatch.setattr(stopping_trainer, "UPDATES", 5)
 
 
@@ -36,6 +38,8 @@ def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: 
     track = Track(SOURCE, CASES, folder, threads=1)
     if kind == "bc":
         return Cloning(load(track), seeds)
+    if kind == "dagger":
+        return Aggregation(track, load(track), seeds)
     if kind == "stopping":
         return Stopping().trainer(track, seeds)
     if kind == "held":
@@ -99,7 +103,7 @@ def test_a_seed_trains_equally_alone_and_with_other_seeds(kind: str, tmp_path: P
     together, alone = trainer(kind, tmp_path, (0, 1), schedule), trainer(kind, tmp_path, (1,), schedule)
     _ = together.advance(), alone.advance()
     (other_seed, actual), (expected,) = together.advance(), alone.advance()
-    tolerance = 1e-3 if kind == "stopping" else 1e-2
+    tolerance = 1e-3 if kind in ("dagger", "stopping") else 1e-2
     assert actual == pytest.approx(expected, rel=tolerance)
     assert other_seed != pytest.approx(expected, rel=tolerance)
 
