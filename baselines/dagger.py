@@ -60,8 +60,8 @@ class Aggregation(Cloning):
         streams = [np.random.default_rng([seed, MET, self.epoch]) for seed in self._seeds]
         met = [pool.draw(rng, len(demonstrated)) for rng, pool in zip(streams, self._pools, strict=True)]
         states, actions = (np.stack(part, axis=1) for part in zip(*met, strict=True))
-        own = self._scaled(states), torch.tensor(actions[..., None], device=self._device)
-        for rows, *pair in zip(demonstrated, *own, strict=True):
+        answered = self._scaled(states), torch.tensor(actions[..., None], device=self._device)
+        for rows, *pair in zip(demonstrated, *answered, strict=True):
             yield torch.cat([self._states[rows], pair[0]], dim=1), torch.cat([self._actions[rows], pair[1]], dim=1)
 
     def _play(self) -> tuple[Arrays, np.ndarray]:
