@@ -61,15 +61,16 @@ class Splits:
         from dextron_bench.world.engine import Engine
 
         engine = Engine(montecarlo.SLOTS, self.threads)
-        scanner = Scanner(open_source(self.reaches), engine, self.runs / "splits" / self.reaches)
+        source, scans = open_source(self.reaches), self.runs / "splits" / self.reaches
         if self.bottles:
-            return bottles.build(scanner, self._table(), self.into)
+            table = self._table()
+            return bottles.build(Scanner(source, engine, scans), table, self.into)
         if self.reaches == "minjerk":
             return building_minjerk.build(self.into, engine)
         if self.database is None:
             raise NeedsDatabase(f"splits of {self.reaches} reaches need --database, which `dextron-bench mc` writes")
         rows, summary = experts_database.load(self.database), experts_database.summary(self.database)
-        entry, distance = building.build(scanner, rows, summary, self.into)
+        entry, distance = building.build(Scanner(source, engine, scans), rows, summary, self.into)
         print(f"best distance of the rule of thumb on val: {distance:g} m")
         return entry
 
