@@ -6,12 +6,13 @@ The forks are a privilege of training: they need a simulator that can be copied.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 
 from dextron_bench import Setting, Track
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches import reach
 from dextron_bench.reaches.setting import Source
 from dextron_bench.storage import atomic, hashing, tensors
 from dextron_bench.world import model, task
@@ -24,6 +25,7 @@ FIRST_TRIED = 3  # Every third decision is tried; then the decisions between a s
 TOGETHER = 96  # Settings that are played together.
 SLOTS = 1024
 NO_DECISION, FAILS, SUCCEEDS = -1, 0, 1
+Episode = tuple[np.ndarray, np.ndarray]  # States (T, 48) and outcomes (T,) of an opening.
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,38 +55,62 @@ def settings_of(track: Track) -> list[Setting]:
 
 
 def load(track: Track) -> Openings:
-    """The openings of a track's settings, played or from its cache; raises DamagedFile."""
+    """The openings of a track's settings, played or from its cache; raises DamagedFile.
+
+    The cache has a file for each reach. So a killed call continues, and other choices of reaches share the files.
+    """
     settings = settings_of(track)
-    file = track.cache / f"openings-{_digest(settings)[:16]}.safetensors"
-    if not file.exists():
-        tensors.write(file, play(track.source, settings, track.threads), {})
-    try:
-        arrays = tensors.read(file)
-        return Openings(**arrays)
-    except (tensors.BadTensors, TypeError) as error:
-        raise atomic.DamagedFile(file, error) from error
+    by_reach: dict[str, list[Setting]] = {}
+    for setting in settings:
+        by_reach.setdefault(setting.reach, []).append(setting)
+    groups = [(track.cache / f"openings-{_digest(group)[:16]}.safetensors", group) for group in by_reach.values()]
+    _play_missing(track, [(file, group) for file, group in groups if not file.exists()])
+    episodes = {setting: one for file, group in groups for setting, one in zip(group, _read(file), strict=True)}
+    return joined([episodes[setting] for setting in settings])
 
 
-def play(source: Source, settings: Sequence[Setting], threads: int = 0) -> dict[str, np.ndarray]:
-    """The arrays of `Openings` for some settings."""
+def play(source: Source, settings: Sequence[Setting], threads: int = 0) -> list[Episode]:
+    """The openings of some settings."""
     engine = Engine(SLOTS, threads)
-    episodes = [
+    return [
         episode
         for first in range(0, len(settings), TOGETHER)
         for episode in _play_together(engine, source, settings[first : first + TOGETHER])
     ]
+
+
+def joined(episodes: Sequence[Episode]) -> Openings:
+    """Openings, one after the other."""
     states, outcomes = zip(*episodes, strict=True)
-    return {
-        "states": np.concatenate(states).astype(np.float32),
-        "outcomes": np.concatenate(outcomes),
-        "starts": np.concatenate([[0], np.cumsum([len(part) for part in states])]),
-    }
+    starts = np.concatenate([[0], np.cumsum([len(part) for part in states])])
+    return Openings(np.concatenate(states).astype(np.float32), np.concatenate(outcomes), starts)
 
 
-def _play_together(
-    engine: Engine, source: Source, settings: Sequence[Setting]
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """The states (T, 48) and outcomes (T,) of each setting's opening."""
+def _play_missing(track: Track, groups: Sequence[tuple[Path, list[Setting]]]) -> None:
+    """Plays groups of settings, at least TOGETHER settings at once, and writes the file of each group."""
+    waiting: list[tuple[Path, list[Setting]]] = []
+    for number, group in enumerate(groups, 1):
+        waiting.append(group)
+        if sum(len(settings) for _, settings in waiting) < TOGETHER and number < len(groups):
+            continue
+        episodes = iter(play(track.source, [one for _, settings in waiting for one in settings], track.threads))
+        for file, settings in waiting:
+            arrays = asdict(joined([next(episodes) for _ in settings]))
+            tensors.write(file, arrays, {})
+        waiting.clear()
+
+
+def _read(file: Path) -> list[Episode]:
+    """The openings in a file; raises DamagedFile."""
+    try:
+        stored = Openings(**tensors.read(file))
+    except (tensors.BadTensors, TypeError) as error:
+        raise atomic.DamagedFile(file, error) from error
+    return [(stored.states[rows], stored.outcomes[rows]) for rows in map(stored.rows, range(len(stored)))]
+
+
+def _play_together(engine: Engine, source: Source, settings: Sequence[Setting]) -> Iterator[Episode]:
+    """The opening of each setting."""
     paths = [source.path(setting) for setting in settings]
     live = np.arange(len(settings))
     states = engine.begin(live, paths)
@@ -113,7 +139,7 @@ def _play_together(
     return zip(map(np.array, episodes), outcomes, strict=True)
 
 
-def _try(engine: Engine, paths: Sequence[Path], episode: np.ndarray, starts: dict[str, np.ndarray]) -> np.ndarray:
+def _try(engine: Engine, paths: Sequence[reach.Path], episode: np.ndarray, starts: dict[str, np.ndarray]) -> np.ndarray:
     """Outcomes (n,) of closing from saved states (n, ...) of episodes (n,), which lie in order, with their paths."""
     position = np.arange(len(episode)) - np.searchsorted(episode, episode)
     outcomes = np.full(len(episode), NO_DECISION, np.int8)
@@ -131,7 +157,7 @@ def _try(engine: Engine, paths: Sequence[Path], episode: np.ndarray, starts: dic
     return np.where(outcomes == NO_DECISION, before, outcomes)
 
 
-def _close(engine: Engine, paths: Sequence[Path], starts: dict[str, np.ndarray]) -> np.ndarray:
+def _close(engine: Engine, paths: Sequence[reach.Path], starts: dict[str, np.ndarray]) -> np.ndarray:
     """Sums of rewards (n,) of episodes that go on from saved states (n, ...) with a hand that closes at full speed."""
     scores, playing = np.zeros(len(paths)), np.full(engine.slots, -1)
     waiting = iter(range(len(paths)))

@@ -42,7 +42,7 @@ class ClosesAt:
 @pytest.fixture(scope="module")
 def played() -> Openings:
     """The openings of the five short settings."""
-    return Openings(**openings.play(SOURCE, SETTINGS, threads=1))
+    return openings.joined(openings.play(SOURCE, SETTINGS, threads=1))
 
 
 def test_an_outcome_is_the_end_of_an_episode_that_closes_there(played: Openings):
@@ -84,16 +84,23 @@ def test_decisions_between_a_success_and_a_failure_are_tried_and_others_taken_to
     assert "".join("-+"[outcome] for outcome in outcomes) == "--++++--+++++"
 
 
-def test_openings_are_kept_and_a_damaged_file_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    track = Track(SOURCE, CASES[:1] * 2, tmp_path, threads=1)
-    first = openings.load(track)
-    assert len(first) == 1  # Each setting counts once.
+def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
+    played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    everything, first_reach = Track(SOURCE, CASES * 2, tmp_path, threads=1), SETTINGS[0].reach
+    first = openings.load(everything)
+    assert len(first) == len(CASES)  # Each setting counts once.
+    for name in ("states", "outcomes", "starts"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(played, name))
     monkeypatch.setattr(openings, "play", None)
-    np.testing.assert_array_equal(openings.load(track).outcomes, first.outcomes)
-    [file] = tmp_path.iterdir()
+    others = [case for case in CASES if case.setting.reach != first_reach]
+    part = openings.load(Track(SOURCE, others, tmp_path, threads=1))
+    rows = [k for k, case in enumerate(CASES) if case.setting.reach != first_reach]
+    np.testing.assert_array_equal(part.outcomes, np.concatenate([first.outcomes[first.rows(k)] for k in rows]))
+    file = min(tmp_path.iterdir())
     file.write_bytes(file.read_bytes()[:-10])
     with pytest.raises(Exception, match=file.name):
-        openings.load(track)
+        openings.load(everything)
 
 
 def test_measurements_of_a_pose_by_hand():
