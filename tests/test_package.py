@@ -1,0 +1,76 @@
+"""The package that would be published: the wheel, built from the source distribution, runs from any folder."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from email.parser import HeaderParser
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("dextron_bench", "baselines")
+
+pytestmark = pytest.mark.slow
+
+
+def run(*words: str, folder: Path, environment: Mapping[str, str] | None = None) -> str:
+    done = subprocess.run(
+        [sys.executable, *words], cwd=folder, env=os.environ | (environment or {}), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("dist")
+    run("-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT), folder=folder)
+    assert len([*folder.glob("*.tar.gz")]) == 1
+    return next(folder.glob("*.whl"))
+
+
+def test_the_wheel_holds_every_file_of_the_packages_and_the_published_results(wheel: Path):
+    held = {name for name in ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    files = {
+        file.relative_to(ROOT).as_posix()
+        for package in PACKAGES
+        for file in (ROOT / package).rglob("*")
+        if file.is_file() and "__pycache__" not in file.parts
+    }
+    results = {
+        file.relative_to(ROOT / "leaderboard").as_posix() for file in ROOT.glob("leaderboard/results/*/*/*/*.json")
+    }
+    assert held == files | {f"dextron_bench/data/{name}" for name in results}
+
+
+def test_its_metadata_say_what_a_reader_of_the_index_needs(wheel: Path):
+    archive = ZipFile(wheel)
+    [name] = [name for name in archive.namelist() if name.endswith("/METADATA")]
+    metadata = HeaderParser().parsestr(archive.read(name).decode())
+    assert metadata["Name"] == "dextron-bench"
+    assert metadata["License-Expression"] == "BSD-2-Clause"
+    assert metadata["Requires-Python"] == ">=3.11"
+    assert metadata["Description-Content-Type"] == "text/markdown"
+    assert "Quick start" in metadata.get_payload()
+    assert {"minari", "video", "onnx"} <= set(metadata.get_all("Provides-Extra", []))
+    assert not any("://" in value for key, value in metadata.items() if key != "Description")
+
+
+def test_the_wheel_runs_without_the_checkout(wheel: Path, tmp_path: Path):
+    installed, elsewhere = tmp_path / "installed", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    install = ("-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target", str(installed), str(wheel))
+    run(*install, folder=elsewhere)
+    environment = {"PYTHONPATH": str(installed)}
+    place = run("-c", "import dextron_bench; print(dextron_bench.__file__)", folder=elsewhere, environment=environment)
+    assert Path(place.strip()).is_relative_to(installed)
+    dextron_bench = ("-m", "dextron_bench")
+    assert "reflex" in run(*dextron_bench, "list", folder=elsewhere, environment=environment)
+    words = ("run", "--method", "nothing", "--split", "val", "--record", "0", "--quiet")
+    assert "nothing" in run(*dextron_bench, *words, folder=elsewhere, environment=environment)
+    assert (elsewhere / "runs/nothing/synthetic/seed0/result.json").exists()
