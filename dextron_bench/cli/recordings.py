@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from dextron_bench.cli.episode_flags import EpisodeFlags
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 
@@ -23,10 +24,14 @@ COLUMNS = {"method": "method", "reaches": "reaches", "seed": "seed", "split": "s
 
 
 @dataclass(frozen=True)
-class List:
+class List(EpisodeFlags):
     """List recordings with their properties. If some are damaged, print a line for each and exit with code 1.
 
+    The cause of an episode is known for recordings in the folder of their run.
+
     Example: dextron-bench recordings list runs/exp/synthetic/seed0 --check
+
+    Example: dextron-bench recordings list --method reflex --cause "too late" --worst 5
     """
 
     place: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN|FILE|DIR ...")] = (
@@ -44,17 +49,24 @@ class List:
 
         files = selection.recordings(self.place)
         summaries = list(recording.summarise(files, self.check, selection.hashes(files) if self.check else {}))
-        undamaged = [summary for summary in summaries if not summary.damage]
+        damaged = [summary for summary in summaries if summary.damage]
+        shown = self._selected([summary for summary in summaries if not summary.damage])
         if self.json:
-            print_json([_row(summary) for summary in summaries])
-        elif undamaged:
-            rows = [_row(summary) for summary in undamaged]
+            print_json([_row(summary) for summary in [*shown, *damaged]])
+        elif shown:
+            rows = [_row(summary) for summary in shown]
             cells = [["" if cell is None else cell for cell in list(row.values())[:-1]] for row in rows]
             print_table("recordings", list(rows[0])[:-1], cells)
-        for summary in summaries:
-            if summary.damage:
-                print(f"dextron-bench: {summary.file}: {summary.damage}", file=sys.stderr)
-        return DONE if len(undamaged) == len(summaries) else DIFFERS
+        for summary in damaged:
+            print(f"dextron-bench: {summary.file}: {summary.damage}", file=sys.stderr)
+        return DIFFERS if damaged else DONE
+
+    def _selected(self, undamaged: list[Summary]) -> list[Summary]:
+        from dextron_bench.runs import recorded_episodes
+        from dextron_bench.runs.selection import EpisodeFilter
+
+        episode_filter = self.episode_filter()
+        return undamaged if episode_filter == EpisodeFilter() else recorded_episodes.select(undamaged, episode_filter)
 
 
 @dataclass(frozen=True)
@@ -92,7 +104,11 @@ class Export:
 
 
 def _row(summary: Summary) -> dict[str, Any]:
+    from dextron_bench.runs import recorded_episodes
+
     row: dict[str, Any] = {"file": str(summary.file)}
     row |= {title: summary.properties.get(name) for name, title in COLUMNS.items()}
-    row["outcome"] = "a pair" if "pair" in summary.properties else row["outcome"]
+    is_pair = "pair" in summary.properties
+    row["outcome"] = "a pair" if is_pair else row["outcome"]
+    row["cause"] = None if is_pair or summary.damage else recorded_episodes.cause(summary)
     return row | {"kB": round(summary.size / 1000), "damage": summary.damage}

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from dextron_bench.cli.episode_flags import EpisodeFlags
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_table, progress_bar
-from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class View:
+class View(EpisodeFlags):
     """Open recordings together in one window of the Rerun viewer; no network is needed.
 
     By default the command opens all recordings at the given places. The options --worst to --row select episodes of
@@ -44,24 +44,6 @@ class View:
 
     place: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN|FILE|DIR|ZIP ...")] = ()
     """Folders of runs or recordings, single recordings, or submissions; by default the folder of all runs."""
-    worst: int | None = None
-    """Select this many episodes with the lowest return."""
-    best: int | None = None
-    """Select this many episodes with the highest return."""
-    method: tuple[str, ...] = ()
-    """Select only episodes of these methods, by their names on the leaderboard."""
-    reaches: tuple[SourceName, ...] = ()
-    """Select only episodes on these sources of reaches."""
-    split: tuple[str, ...] = ()
-    """Select only episodes of these splits."""
-    seed: tuple[int, ...] = ()
-    """Select only episodes of agents with these seeds."""
-    failed: bool = False
-    """Select only episodes without success."""
-    cause: tuple[str, ...] = ()
-    """Select only episodes with this cause, such as "too late"; docs/diagnosis.md lists all causes."""
-    row: tuple[int, ...] = ()
-    """Select only these rows of the splits."""
     diff: bool = False
     """Show two places side by side."""
     live: bool = False
@@ -80,7 +62,7 @@ class View:
 
         if self.live:
             return self._play_live()
-        places, episode_filter = self._places(), self._filter()
+        places, episode_filter = self._places(), self.episode_filter()
         files = [self._side_by_side(places, episode_filter)] if self.diff else self._recordings(places, episode_filter)
         undamaged = _undamaged(files)
         if self.print:
@@ -142,11 +124,6 @@ class View:
             raise BadFilter("--live takes one --method, such as rlil or exp")
         if not 0.0 <= self.speed < float("inf"):
             raise BadFilter(f"--speed must be a multiple of real time, or 0 for no delay, not {self.speed:g}")
-
-    def _filter(self) -> EpisodeFilter:
-        from dextron_bench.runs.selection import EpisodeFilter
-
-        return EpisodeFilter(**{name: getattr(self, name) for name in EpisodeFilter.__slots__})
 
     def _select(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
         """The recordings of selected episodes; prints a table of them unless --print is set."""

@@ -104,10 +104,17 @@ def select(table: pd.DataFrame, episode_filter: EpisodeFilter) -> tuple[pd.DataF
         raise NoEpisodes(f"{len(passing)} of {len(table)} episodes match the filter{unplayed}")
     if episode_filter.worst is None and episode_filter.best is None:
         return played.head(LIMIT), len(played)
-    worst = played.sort_values("score", kind="stable").head(episode_filter.worst or 0)
-    best = played.sort_values("score", ascending=False, kind="stable").head(episode_filter.best or 0)
+    return best_and_worst(played, episode_filter), len(played)
+
+
+def best_and_worst(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.DataFrame:
+    """The episodes with the lowest and the highest returns, as many as the filter says; all if it names no number."""
+    if episode_filter.worst is None and episode_filter.best is None:
+        return table
+    worst = table.sort_values("score", kind="stable").head(episode_filter.worst or 0)
+    best = table.sort_values("score", ascending=False, kind="stable").head(episode_filter.best or 0)
     selected = pd.concat([worst, best])
-    return selected[~selected.index.duplicated()], len(played)
+    return selected[~selected.index.duplicated()]
 
 
 def matching(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.DataFrame:

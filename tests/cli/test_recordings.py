@@ -39,9 +39,29 @@ def test_recordings_are_listed_with_their_properties(here: Path, capsys: pytest.
     steps = int(pd.read_parquet(Path(FOLDER).parent / "episodes.parquet")["length"][1])
     assert row == {
         "file": f"{FOLDER}/test-0001.rrd", "method": "exp", "reaches": "synthetic", "seed": 0, "split": "test",
-        "row": 1, "return": 20.0, "outcome": "success", "steps": steps,
+        "row": 1, "return": 20.0, "outcome": "success", "steps": steps, "cause": "solved",
         "kB": round(Path(f"{FOLDER}/test-0001.rrd").stat().st_size / 1000), "damage": "",
     }  # fmt: skip
+
+
+def test_recordings_are_selected_in_the_words_of_view(
+    here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
+):
+    nothing = ["run", "--method", "nothing", "--split", "test", "--no-floors", "--quiet", "--json", "--record", "2"]
+    assert main.main(nothing) == 0
+
+    def listed(*words: str) -> list[tuple[str, int, str]]:
+        capsys.readouterr()
+        assert main.main(["recordings", "list", "--json", *words]) == 0
+        return [(one["method"], one["row"], one["cause"]) for one in json.loads(capsys.readouterr().out)]
+
+    episodes = [*listed("--method", "exp"), *listed("--failed")]
+    assert [episode[:2] for episode in episodes] == [("exp", 0), ("exp", 1), ("nothing", 0), ("nothing", 1)]
+    assert listed() == episodes
+    assert listed("--cause", "solved", "--row", "1") == [("exp", 1, "solved")]
+    assert listed("--worst", "1") == episodes[2:3]
+    assert listed("--best", "1") == episodes[:1]
+    assert "no episode has method 'bc'; choose from exp, nothing" in complaint("recordings", "list", "--method", "bc")
 
 
 def test_damaged_recordings_are_a_line_each_and_code_1(here: Path, capsys: pytest.CaptureFixture[str]):
