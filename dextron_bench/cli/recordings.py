@@ -83,20 +83,22 @@ class Export:
     into: Annotated[Path, tyro.conf.arg(metavar="FILE.{mp4,gif,csv,parquet}")]
     """The file to write."""
     camera: str = "side"
-    """The camera of a film: behind, front, hand, hero, side or top."""
+    """The camera of a film: behind, follow (near the hand, moves with it), front, hand, hero, side or top."""
     width: int = 640
     """Width of a film [pixels]."""
     height: int = 480
     """Height of a film [pixels]."""
     speed: float = 1.0
     """Speed of a film, as a multiple of real time."""
+    plain: bool = False
+    """No numbers in the picture of a film."""
     quiet: bool = False
     """Show no progress."""
 
     def __call__(self) -> int:
         from dextron_bench.recording import export, film
 
-        look = film.FilmStyle(self.width, self.height, self.camera, self.speed)
+        look = film.FilmStyle(self.width, self.height, self.camera, self.speed, not self.plain)
         with progress_bar("pictures", self.quiet) as progress:
             export.export(self.file, self.into, look, progress)
         print(self.into)

@@ -9,6 +9,7 @@ import pandas as pd
 
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.recording import film, summaries
+from dextron_bench.recording.film_overlay import SMALLEST, Overlay
 from dextron_bench.storage import atomic
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import model
@@ -35,7 +36,8 @@ def export(source: Path, into: Path, style: film.FilmStyle, progress: Progress =
         raise UnknownSuffix(into)
     episode = summaries.read_safely(source).episode
     if suffix in FILMS:
-        atomic.write_atomically(into, lambda part: FILMS[suffix](part, episode.states, style, progress))
+        draw = Overlay(episode, style.height).draw if style.overlay and style.height >= SMALLEST else film.undrawn
+        atomic.write_atomically(into, lambda part: FILMS[suffix](part, episode.states, style, progress, draw))
     elif suffix == ".csv":
         atomic.write_atomically(into, lambda part: step_table(episode).to_csv(part, index=False))
     else:

@@ -104,5 +104,5 @@ def test_frames_of_a_film_are_close_to_stills():
     with renderer.Renderer(32, 24, supersampling=2) as frame_renderer:
         expected = frame_renderer.render(states[0], renderer.CAMERAS["side"])
     np.testing.assert_array_equal(renderer.frames(states, 32, 24)[0], expected)
-    coarse = next(iter(film._frames(states, FilmStyle(32, 24))))
+    coarse = next(iter(film._frames(states, [0], FilmStyle(32, 24))))
     assert np.abs(coarse.astype(int) - expected).mean() < 5.0

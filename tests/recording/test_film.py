@@ -95,7 +95,7 @@ def test_an_impossible_style_is_refused(style: dict[str, float], message: str):
 
 
 def test_an_unknown_camera_lists_the_cameras():
-    with pytest.raises(renderer.UnknownCamera, match="no camera 'left'; choose from behind, front"):
+    with pytest.raises(renderer.UnknownCamera, match="no camera 'left'; choose from behind, follow, front"):
         FilmStyle(camera="left")
 
 

@@ -51,8 +51,8 @@ class NoGraphics(RuntimeError):
 class UnknownCamera(KeyError):
     """No camera has that name; the message lists the names."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(f"no camera {name!r}; choose from {', '.join(sorted(CAMERAS))}")
+    def __init__(self, name: str, *others: str) -> None:
+        super().__init__(f"no camera {name!r}; choose from {', '.join(sorted((*CAMERAS, *others)))}")
 
     def __str__(self) -> str:
         return str(self.args[0])
