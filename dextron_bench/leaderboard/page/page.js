@@ -12,13 +12,20 @@ function isChosen(element) {
   });
 }
 
+/** Fades the right edge of each part that can be scrolled further to the right. */
+function markEdges() {
+  for (const part of document.querySelectorAll(".scroll"))
+    part.classList.toggle("more", part.scrollLeft + part.clientWidth < part.scrollWidth - 1);
+}
+
 function filter() {
   const text = choice("text").trim().toLowerCase(), tier = choice("tier");
-  let shown = 0;
+  let shown = 0, quoted = 0;
   for (const row of rows) {
     const matches = (!tier || row.dataset.tier === tier) && row.textContent.toLowerCase().includes(text);
     row.hidden = !(matches && isChosen(row));
-    shown += !row.hidden;
+    if (row.dataset.tier === "quoted") quoted += !row.hidden;
+    else shown += !row.hidden;
   }
   for (const section of document.querySelectorAll("main > section")) {
     const parts = [...section.querySelectorAll(":scope > [data-reaches]")];
@@ -26,7 +33,9 @@ function filter() {
     const nothing = section.querySelector(".nothing");
     if (nothing) nothing.hidden = !parts.length || parts.some((part) => !part.hidden);
   }
-  count.textContent = `${shown} of ${rows.length} rows${order}`;
+  const all = rows.filter((row) => row.dataset.tier !== "quoted").length;
+  count.textContent = `${shown} of ${all} rows${quoted ? `, ${quoted} quoted` : ""}${order}`;
+  markEdges();
   saveChoice();
 }
 
@@ -69,6 +78,8 @@ for (const button of table.tHead.querySelectorAll("button")) {
     filter();
   });
 }
+for (const part of document.querySelectorAll(".scroll")) part.addEventListener("scroll", markEdges, { passive: true });
+addEventListener("resize", markEdges);
 controls.addEventListener("input", filter);
 controls.addEventListener("submit", (event) => event.preventDefault());
 controls.hidden = false;

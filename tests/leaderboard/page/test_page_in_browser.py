@@ -74,3 +74,19 @@ def test_print_has_no_controls_and_cuts_nothing_off(browser: Any):
         opened.emulate_media(media="print")
         assert not opened.locator(".controls").is_visible()
         assert opened.evaluate("document.documentElement.scrollWidth") <= 1030
+
+
+def test_a_part_that_goes_on_to_the_right_fades_there_until_it_is_scrolled_to_its_end(browser: Any):
+    with visit(browser, PUBLISHED, viewport={"width": 1400, "height": 800}) as opened:
+        standings = opened.locator(".scroll.wide")
+        assert standings.evaluate("part => getComputedStyle(part).maskImage") != "none"
+        standings.evaluate("part => part.scrollTo(part.scrollWidth, 0)")
+        opened.wait_for_function("!document.querySelector('.scroll.wide').classList.contains('more')")
+        assert standings.evaluate("part => getComputedStyle(part).maskImage") == "none"
+
+
+def test_on_a_phone_the_legend_stays_while_its_tables_scroll_by(browser: Any):
+    with visit(browser, PUBLISHED, viewport={"width": 390, "height": 800}) as opened:
+        opened.evaluate("document.querySelector('.legend').scrollIntoView(); scrollBy(0, 300)")
+        top = opened.evaluate("document.querySelector('.legend').getBoundingClientRect().top")
+        assert -1 <= top <= 1
