@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
-from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.cli.output import print_json, print_table, print_warning, progress_bar
 
 if TYPE_CHECKING:
     from dextron_bench.recording import Summary
@@ -53,7 +52,7 @@ class List:
             print_table("recordings", list(rows[0])[:-1], cells)
         for summary in summaries:
             if summary.damage:
-                print(f"dextron-bench: {summary.file}: {summary.damage}", file=sys.stderr)
+                print_warning(f"{summary.file}: {summary.damage}")
         return DONE if len(undamaged) == len(summaries) else DIFFERS
 
 
