@@ -191,12 +191,13 @@ def test_an_agent_may_write_in_its_own_folder(agent_spec: Callable[[str], str]):
     assert [episode.failure for episode in play(agent_spec(act))] == [""] * 3
 
 
-def test_nan_fails_one_episode_and_a_crash_fails_the_current_episodes(agent_spec: Callable[[str], str]):
-    """With two slots the third episode begins after the crash, in a new process."""
+def test_nan_fails_one_episode_and_a_crash_fails_the_current_episodes(agent_spec: Callable[[str], str], tmp_path: Path):
+    """With two slots the third episode begins after the crash, alone, in a new process."""
     nan = play(agent_spec("a = np.zeros((len(states), 1)); a[0] = np.nan; return a"), CASES[:2])
     assert [episode.failure for episode in nan] == ["action is nan at step 0", ""]
-    act = f"import os; len(states) == 2 and os._exit(1); {CLOSES}"  # The third episode is alone.
-    first, second, third = play(agent_spec(act))
+    spec, file = agent_spec(f"import os; self.begun == 2 and os._exit(1); {CLOSES}"), tmp_path / "mine.py"
+    file.write_text(file.read_text().replace("pass", "self.begun = len(episodes)"))
+    first, second, third = play(spec)
     assert first.failure == second.failure == "it ended with code 1 at step 0"
     assert third.failure == ""
     assert len(third.actions) > 10
