@@ -14,7 +14,7 @@ import tyro
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
-from dextron_bench.storage.printable import printable
+from dextron_bench.storage.printable import printable, printable_line
 
 if TYPE_CHECKING:
     from dextron_bench.leaderboard.submission.verdict import Verdict
@@ -83,9 +83,9 @@ class Verify:
             with progress_bar(row.name, self.quiet) as progress:
                 finding = verify_board.check(row, self.board, self.rows, self.redraw, self.threads, progress)
             done = finding.done if not finding.problems else "DIFFERS from its episodes"
-            print(printable(f"{row.name}: {done}"), flush=True)
+            print(printable_line(f"{row.name}: {done}"), flush=True)
             for problem in finding.problems[:SHOWN]:
-                print(f"  {printable(problem)}")
+                print(f"  {printable_line(problem)}")
             sound &= not finding.problems
             if self.stamp and verify_board.stamp(row, finding):
                 print("  its tier is now `re-run`")
@@ -118,11 +118,6 @@ class Add:
     """With --rerun: how many fresh settings of each split its agent plays; 0 means as many as the split has."""
     replace: bool = False
     """Replace a submission of the same name."""
-    beacon: str = ""
-    """With --rerun: a public value that did not exist when the submission was made, from which fresh settings follow;
-    by default a random one."""
-    fresh_rows: int = 0
-    """With --rerun: how many fresh settings of each split its agent plays; 0 means as many as the split has."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard."""
     threads: int = 0
@@ -170,12 +165,12 @@ def print_verdict(verdict: Verdict) -> int:
     """Prints the result of a verification and returns the exit code."""
     name = f"{verdict.manifest['name']} on {verdict.manifest['reaches']} reaches"
     for note in verdict.notes:
-        print(printable(f"note: {note}"))
+        print(printable_line(f"note: {note}"))
     if verdict.passed:
         print(f"{name}: {verdict.tier}; {verdict.exact} of {verdict.episodes} episodes equal bit for bit")
         print_fresh(verdict)
         return DONE
-    print(f"{name}: refused", *map(printable, verdict.problems), sep="\n  ")
+    print(f"{name}: refused", *map(printable_line, verdict.problems), sep="\n  ")
     return DIFFERS
 
 

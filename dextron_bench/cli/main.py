@@ -17,7 +17,7 @@ import tyro
 from dextron_bench.cli import method_flags, usage
 from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
-from dextron_bench.storage.printable import printable
+from dextron_bench.cli.output import print_warning
 
 BLAS = "OPENBLAS_NUM_THREADS"  # NumPy's products are small here, so more threads would mostly wait for each other.
 PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if debug:
             raise
         code, message = explain(error)
-        print(f"dextron-bench: {printable(message)}", file=sys.stderr)
+        print_warning(message)
         return code
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from dextron_bench.storage.printable import printable
+from dextron_bench.storage.printable import printable, printable_line
 from dextron_bench.storage.progress import Progress, no_progress
 
 WIDTH = 1000  # Columns of a table that is not printed on a terminal, so that no cell is folded.
@@ -33,6 +33,11 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[obje
     with console.capture() as captured:  # Rich would end the process if the reader of a pipe has left.
         console.print(table)
     print(captured.get(), end="")
+
+
+def print_warning(text: str) -> None:
+    """Prints one line on stderr; text of a stranger shows no control characters and is cut."""
+    print(f"dextron-bench: {printable_line(text)}", file=sys.stderr)
 
 
 def print_json(value: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +10,7 @@ import tyro
 
 from dextron_bench.cli.episode_flags import EpisodeFlags
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
-from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.cli.output import print_json, print_table, print_warning, progress_bar
 
 if TYPE_CHECKING:
     from dextron_bench.recording import Summary
@@ -58,7 +57,7 @@ class List(EpisodeFlags):
             cells = [["" if cell is None else cell for cell in list(row.values())[:-1]] for row in rows]
             print_table("recordings", list(rows[0])[:-1], cells)
         for summary in damaged:
-            print(f"dextron-bench: {summary.file}: {summary.damage}", file=sys.stderr)
+            print_warning(f"{summary.file}: {summary.damage}")
         return DIFFERS if damaged else DONE
 
     def _selected(self, undamaged: list[Summary]) -> list[Summary]:

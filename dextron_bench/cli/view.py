@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ import tyro
 
 from dextron_bench.cli.episode_flags import EpisodeFlags
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
-from dextron_bench.cli.output import print_table, progress_bar
+from dextron_bench.cli.output import print_table, print_warning, progress_bar
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -135,8 +134,9 @@ class View(EpisodeFlags):
         if not self.print:
             _print_episodes(table)
         if len(table) < matching and episode_filter.worst is None and episode_filter.best is None:
-            line = f"{matching} episodes match; these are the first {len(table)}, --worst {matching} selects all"
-            print(f"dextron-bench: {line}", file=sys.stderr)
+            print_warning(
+                f"{matching} episodes match; these are the first {len(table)}, --worst {matching} selects all"
+            )
         return files
 
 
@@ -149,8 +149,8 @@ def _undamaged(files: Sequence[Path]) -> list[Path]:
     damaged = [f"{summary.file}: {summary.damage}" for summary in summaries if summary.damage]
     if len(damaged) == len(summaries):
         raise selection.NoEpisodes("; ".join(damaged))
-    for line in damaged:
-        print(f"dextron-bench: {line}", file=sys.stderr)
+    for fault in damaged:
+        print_warning(fault)
     return [summary.file for summary in summaries if not summary.damage]
 
 

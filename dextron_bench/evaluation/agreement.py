@@ -26,7 +26,7 @@ class BadOutcomes(ValueError):
 def read(file: Path) -> pd.DataFrame:
     """The outcomes in a CSV file, with the columns `reach`, `stratum` and NUMBERS; raises BadOutcomes, OSError."""
     try:
-        table = pd.read_csv(file, dtype={"reach": str, "stratum": str})
+        table = pd.read_csv(file, dtype={"reach": str, "stratum": str}, float_precision="round_trip")
     except ValueError as error:  # Also a file that is empty or not UTF-8.
         raise BadOutcomes(f"{file}: is not a CSV file ({error})") from error
     missing = [name for name in ("reach", "stratum", *NUMBERS) if name not in table]

@@ -14,17 +14,20 @@ from typing import Any
 from rerun.chunk import RrdReader
 
 PROPERTIES = "/__properties/"
+LONGEST = 2**16  # Characters of a line; whoever reads all lines of many files keeps them in memory.
+TOO_LONG = f"its properties have more than {LONGEST} characters"
 
 
 def main() -> None:
     """Prints `null` when it is ready, and then applications and properties of each file, or the error."""
     print("null", flush=True)
-    for line in sys.stdin:
+    for name in sys.stdin:
         try:
-            description = _describe(json.loads(line), "whole" in sys.argv[1:])
+            description = _describe(json.loads(name), "whole" in sys.argv[1:])
         except Exception as error:  # Rerun's readers raise errors of any type.
-            description = {"error": " ".join(str(error).split())}
-        print(json.dumps(description), flush=True)
+            description = {"error": " ".join(str(error).split())[:LONGEST]}
+        line = json.dumps(description)
+        print(line if len(line) <= LONGEST else json.dumps({"error": TOO_LONG}), flush=True)
 
 
 def _describe(file: str, whole: bool) -> dict[str, Any]:

@@ -10,7 +10,14 @@ import unicodedata
 
 HIDDEN = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")  # Unicode categories without a visible sign.
 JOINERS = "\N{ZERO WIDTH NON-JOINER}\N{ZERO WIDTH JOINER}"  # Names in some scripts need them.
+LONGEST = 2000  # Characters of a line that is printed.
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # Beginnings of a cell that a spreadsheet computes.
+
+
+def printable_line(text: str) -> str:
+    """The text as one line that may be printed: printable, and cut after LONGEST characters."""
+    cut = len(text) - LONGEST
+    return printable(text) if cut <= 0 else f"{printable(text[:LONGEST])}... and {cut} more characters"
 
 
 def first_hidden(text: str) -> str:

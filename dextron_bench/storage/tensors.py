@@ -20,6 +20,7 @@ ABOUT = "about"  # The only key of a file's metadata: several keys would have no
 DTYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
 SEAL = "seal"  # Entry of the metadata that is written and removed here: its own digest, and the arrays'.
 LENGTH = 8  # [bytes] at the start of a file that hold the length of the header.
+LONGEST_HEADER = 16 * 2**20  # [bytes]; a parsed header takes up to thirty times as much memory.
 
 
 class BadTensors(ValueError):
@@ -48,6 +49,7 @@ def digest(arrays: Mapping[str, np.ndarray]) -> str:
 def read(file: Path) -> dict[str, np.ndarray]:
     """The arrays of a file, writable; raises BadTensors, OSError."""
     content = _content(file)
+    _header(file)
     try:
         arrays = {name: array.copy() for name, array in load(content).items()}  # Copies are writable.
     except Exception as error:  # A malicious header may raise any error.
@@ -99,10 +101,12 @@ def _digest_of_about(about: Mapping[str, Any]) -> str:
 
 
 def _header(file: Path) -> tuple[int, bytes]:
-    """The length of the header that a file states, and the header."""
+    """The length of the header that a file states, and the header; raises BadTensors, OSError."""
     with file.open("rb") as content:
         length = int.from_bytes(content.read(LENGTH), "little")
-        return length, content.read(min(length, file.stat().st_size))
+        if length > LONGEST_HEADER:
+            raise BadTensors(file, f"its header is longer than {LONGEST_HEADER / 2**20:g} MiB")
+        return length, content.read(length)
 
 
 def _memory_map(file: Path, start: int, entry: Mapping[str, Any]) -> np.ndarray:

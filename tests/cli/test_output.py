@@ -86,3 +86,11 @@ def test_without_a_terminal_a_line_each_minute_says_what_is_done_and_left(
 
 def test_a_duration_has_two_units_at_most():
     assert [output._duration(seconds) for seconds in (59.4, 61.0, 7320.0)] == ["59 s", "1 min", "2 h 2 min"]
+
+
+def test_a_warning_is_one_short_line_without_control_characters(capsys: pytest.CaptureFixture[str]):
+    output.print_warning("runs/\x1b[2J.rrd: damaged\n" + "x" * 5000)
+    printed = capsys.readouterr().err
+    assert printed.startswith("dextron-bench: runs/\\x1b[2J.rrd: damaged\\nxxx")
+    assert printed.endswith("x... and 3023 more characters\n")
+    assert printed.count("\n") == 1

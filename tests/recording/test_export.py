@@ -45,7 +45,7 @@ def test_every_number_of_a_state_has_a_name():
 def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, suffix: str):
     file = tmp_path / "new" / f"episode{suffix}"
     export.export(recorded, file, FilmStyle())
-    table = pd.read_parquet(file) if suffix == ".parquet" else pd.read_csv(file)
+    table = pd.read_parquet(file) if suffix == ".parquet" else pd.read_csv(file, float_precision="round_trip")
     played = recording.read(recorded).episode
     assert list(table.columns) == ["step", "seconds", *model.state_names(), "action", "reward"]
     assert table["step"].tolist() == [0, 1, 2, 3, 4]

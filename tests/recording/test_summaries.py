@@ -72,6 +72,13 @@ def test_each_fault_of_the_format_has_its_message(whole: Path, tmp_path: Path):
         assert damage.startswith(message), name
 
 
+def test_long_properties_do_not_reach_the_process_that_asks(whole: Path, tmp_path: Path):
+    """A file of a megabyte can hold a text that fills the memory."""
+    file = tmp_path / "long.rrd"
+    recording.write(file, episode(20), PATH, {**PROPERTIES, "note": "x" * 2**16})
+    assert damages([file, whole]) == ["is damaged (its properties have more than 65536 characters)", ""]
+
+
 def test_other_applications_other_versions_and_damage_have_different_messages(whole: Path, tmp_path: Path):
     other, older, flipped = (tmp_path / name for name in ("other.rrd", "older.rrd", "flipped.rrd"))
     for file, application in ((other, "another"), (older, "dextron-bench")):

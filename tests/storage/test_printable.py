@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dextron_bench.storage.printable import first_hidden, printable, spreadsheet_cell
+from dextron_bench.storage.printable import LONGEST, first_hidden, printable, printable_line, spreadsheet_cell
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,11 @@ def test_characters_without_a_visible_sign_are_escaped(text: str, escaped: str):
     assert printable(text) == escaped
     assert first_hidden(text) in text
     assert first_hidden(text) != ""
+
+
+def test_a_line_is_cut():
+    assert printable_line("\x1b" + "x" * (LONGEST + 6)) == "\\x1b" + "x" * (LONGEST - 1) + "... and 7 more characters"
+    assert printable_line("x" * LONGEST) == "x" * LONGEST
 
 
 @pytest.mark.parametrize("text", ["Müller, 王, 2 GPUs · 50 %", "\u0645\u06cc\u200c\u0631\u0648\u0645"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -52,6 +53,16 @@ def test_a_damaged_file_is_named(tmp_path: Path, content: bytes, function: Calla
     file = tmp_path / "a.safetensors"
     file.write_bytes(content)
     with pytest.raises(tensors.BadTensors, match=r"a\.safetensors is damaged or not a safetensors file \(.+\)"):
+        function(file)
+
+
+@pytest.mark.parametrize("function", [tensors.read, tensors.memory_mapped, tensors.read_about])
+def test_a_header_that_fills_the_memory_is_not_parsed(tmp_path: Path, function: Callable[[Path], object]):
+    file = tmp_path / "a.safetensors"
+    about = json.dumps("[" + "{}," * (tensors.LONGEST_HEADER // 3) + "0]")
+    header = f'{{"__metadata__": {{"about": {about}}}}}'.encode()
+    file.write_bytes(len(header).to_bytes(8, "little") + header)
+    with pytest.raises(tensors.BadTensors, match="its header is longer than 16 MiB"):
         function(file)
 
 

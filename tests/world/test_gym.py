@@ -246,7 +246,7 @@ def test_a_setting_that_is_none_is_refused(value: object):
 def test_a_reset_mask_of_another_form_is_refused_as_in_gymnasium(mask: Any, error: type[Exception], message: str):
     for env in (GraspVectorEnv(2, SOURCE), sync_vector(2)):
         env.reset(seed=0)
-        with pytest.raises(error):
+        with pytest.raises((error, AssertionError)):  # Gymnasium 1.2 asserts.
             env.reset(options={"reset_mask": mask})
     with pytest.raises(error, match=message):
         GraspVectorEnv(2, SOURCE).reset(options={"reset_mask": mask})

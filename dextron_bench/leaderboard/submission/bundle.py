@@ -151,15 +151,17 @@ def _schema(name: str) -> jsonschema.Draft202012Validator:
 
 
 def _check_directory(file: Path) -> None:
-    """Raises BadBundle if the list of members, which is read as a whole, is longer than in any bundle."""
+    """Raises BadBundle if the list of members, which is read as a whole, is too long or lies outside the file."""
     with file.open("rb") as content:
-        content.seek(max(0, file.stat().st_size - END_SIZE - LARGEST_COMMENT - len(ZIP64) - 16))
+        start = content.seek(max(0, file.stat().st_size - END_SIZE - LARGEST_COMMENT - len(ZIP64) - 16))
         tail = content.read()
     last = len(tail) - END_SIZE  # Where `zipfile` looks first; then it takes the last record before a comment.
     place = last if tail[last:].startswith(END) and tail.endswith(b"\0\0") else tail.rfind(END)
-    size = int.from_bytes(tail[place + 12 : place + 16], "little") if place >= 0 else 0
+    size, offset = (int.from_bytes(tail[place + k : place + k + 4], "little") if place >= 0 else 0 for k in (12, 16))
     if size > LARGEST_DIRECTORY or tail[max(0, place - 20) :].startswith(ZIP64):
         raise BadBundle(f"{file} lists more files than the {MEMBERS} that a bundle accepts")
+    if place >= 0 and offset + size > start + place:  # `zipfile` would look for files before the first byte.
+        raise BadBundle(f"{file} is not a complete zip file: its list of files is not where its end says")
 
 
 def _members(file: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:

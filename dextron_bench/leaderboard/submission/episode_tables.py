@@ -16,6 +16,7 @@ from dextron_bench.leaderboard.submission.bundle import BadBundle
 from dextron_bench.leaderboard.submission.table_process import SETTING
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import limited_process
+from dextron_bench.storage.printable import first_hidden
 from dextron_bench.world import model, task
 
 LISTS = {"actions": task.STEP_LIMIT, "final": model.STATE}  # With the largest length of each.
@@ -41,7 +42,12 @@ def read(file: Path, splits: Sequence[Split]) -> pd.DataFrame:
 
 
 def faults(table: pd.DataFrame, splits: Sequence[Split]) -> Iterator[str]:
-    """A line for each row that is missing, duplicate, or of another split, setting or number of actions."""
+    """A line for each row that is missing, duplicate, or of another split, setting or number of actions.
+
+    Also a line for a text with a character that cannot be printed: the board keeps the reasons of failures.
+    """
+    if characters := [hidden for reason in set(table["failure"]) if (hidden := first_hidden(reason))]:
+        yield f"has the character {min(characters)!r} in column 'failure'"
     for name in sorted(set(table["split"]) - {split.name for split in splits}):
         yield f"{name} is not a split that ranks methods"
     for split in splits:

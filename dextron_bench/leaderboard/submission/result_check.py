@@ -49,9 +49,12 @@ def differences(result: dict[str, Any], computed: dict[str, Any]) -> Iterator[st
 
 
 def distant_returns(result: dict[str, Any], computed: dict[str, Any]) -> Iterator[str]:
-    """A line for each split whose mean return differs from the computed one by more than RETURN_TOLERANCE."""
-    for split, scores in result["splits"].items():
-        claimed, replayed = (float(np.mean(part["scores"])) for part in (scores, computed["splits"][split]))
+    """A line for each split whose mean return differs from the computed one by more than RETURN_TOLERANCE.
+
+    Splits that only one of both has are left out; `differences` names them.
+    """
+    for split in sorted(result["splits"].keys() & computed["splits"].keys()):
+        claimed, replayed = (float(np.mean(part["splits"][split]["scores"])) for part in (result, computed))
         if abs(claimed - replayed) > RETURN_TOLERANCE:
             yield f"its result has a mean return of {claimed:.2f} on {split}; played again it is {replayed:.2f}"
 

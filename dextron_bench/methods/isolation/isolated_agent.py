@@ -84,8 +84,8 @@ class IsolatedAgent:
     def _start(self, episodes: int) -> Process:
         self.starts += 1
         try:
-            command = self._launch.command_line(self._scratch.name, self._limits.memory)
             size, limits = protocol.max_answer_size(episodes), self._limits
+            command = self._launch.command_line(self._scratch.name, limits.memory, limits.disk)
             process = self._process = Process(command, self._scratch.name, size, limits.memory, limits.disk)
         except (OSError, IndexError) as error:
             raise AgentError(f"the agent's process cannot be started: {error}") from error

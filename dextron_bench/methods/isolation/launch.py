@@ -41,8 +41,8 @@ class Launch:
     readable: tuple[str, ...] = ()
     trusted: bool = True
 
-    def command_line(self, scratch: str, memory: int) -> list[str]:
-        """The words of the whole command: sandbox, limits [bytes of memory], and the agent that writes to `scratch`.
+    def command_line(self, scratch: str, memory: int, disk: int) -> list[str]:
+        """The words of the whole command: sandbox, limits [bytes], and the agent that writes to `scratch`.
 
         Raises NoSandbox if the code is not trusted and there is no sandbox.
         """
@@ -50,7 +50,7 @@ class Launch:
             raise NoSandbox(self.spec)
         request = json.dumps({**asdict(self), "scratch": scratch, "constants": guard.constants()})
         worker = [sys.executable, "-P", "-m", "dextron_bench.methods.isolation.worker", request]
-        return sandbox.wrap(self.command or worker, scratch, self.readable, memory, self._public_files())
+        return sandbox.wrap(self.command or worker, scratch, self.readable, memory, disk, self._public_files())
 
     def _public_files(self) -> list[Path]:
         """This package's files that the process may read; empty for all, since an installed method may import any."""

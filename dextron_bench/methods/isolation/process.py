@@ -13,12 +13,14 @@ from contextlib import suppress
 from typing import IO
 
 from dextron_bench.methods.isolation import usage
+from dextron_bench.storage.printable import printable
 
 ENVIRONMENT = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT", "VIRTUAL_ENV")  # Variables that a process keeps.
 EXIT_TIMEOUT = 5.0  # [s] that a process may take to end after it has closed its output.
 PERIOD = 0.1  # [s] between two measurements of memory and disk.
 MOST_PROCESSES = 64
 STDERR_TAIL = 2000  # [bytes] at the end of stderr in which the last line is searched.
+LAST_LINE = 500  # Characters of that line that a message shows; a table of episodes in a bundle has short texts only.
 
 
 class NoAnswer(RuntimeError):
@@ -75,7 +77,7 @@ class Process:
         return line
 
     def describe_failure(self, error: Exception) -> str:
-        """The error, how the process ended if it did, and the last line that it wrote to stderr."""
+        """The error, how the process ended if it did, and the end of its last line on stderr, printable."""
         if self._excess:
             return self._excess
         if str(error) == "it ended":
@@ -86,7 +88,7 @@ class Process:
             error = NoAnswer(f"it ended with {_describe_exit(code)}")
         self._stderr.seek(max(0, self._stderr.seek(0, os.SEEK_END) - STDERR_TAIL))
         lines = self._stderr.read().decode(errors="replace").split("\n")
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        last = printable(next((line.strip() for line in reversed(lines) if line.strip()), ""))[-LAST_LINE:]
         return f"{error}: {last}" if last else str(error)
 
     def peak_memory(self) -> int:

@@ -1,8 +1,9 @@
 """The command around an agent's process: limits on memory and files, and a sandbox if bubblewrap is installed.
 
-In the sandbox there is no network and no other process. The agent can write only in its own folder. It can read only
-programs, Python's files, its own files, and the public modules of this package. The simulator, the splits and the
-experts are not there. An installed method may read all of this package's code, since the user has chosen to install it.
+In the sandbox there is no network and no other process. The agent can write only in its own folder, which is in memory,
+has a fixed size and is empty at each start. It can read only programs, Python's files, its own files, and the public
+modules of this package. The simulator, the splits and the experts are not there. An installed method may read all of
+this package's code, since the user has chosen to install it.
 """
 
 from __future__ import annotations
@@ -14,33 +15,35 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-PROGRAMS = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc/ld.so.cache", "/etc/alternatives")
+# Parts of /usr and /usr/local, and of Python's prefix: other folders there may hold a project with results and splits.
+PARTS = ("bin", "sbin", "lib", "lib32", "lib64", "libexec", "share")
+PYTHON = ("bin", "lib", "lib64", "pyvenv.cfg")
+PROGRAMS = (
+    *(f"/usr/{part}" for part in PARTS),
+    *(f"/usr/local/{part}" for part in PARTS),
+    *("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc/ld.so.cache", "/etc/alternatives"),
+)
 SIMULATORS = ("mujoco", "dm_control")  # Packages that are hidden.
 SYSTEM_LIBRARIES = ("/usr/lib", "/usr/local/lib")  # Where other interpreters have packages.
-SECRET = ("splits", "experts", "real", "synthetic")  # The package's data files that begin so hold settings or experts.
+# The package's data files and folders that begin so hold settings, experts, reaches or published episodes.
+SECRET = ("splits", "experts", "real", "synthetic", "results")
 LARGEST_FILE = 256 * 2**20  # [bytes] of a file that an agent may write; its stderr is one such file.
-# The last two options exist since bubblewrap 0.8.
-NAMESPACES = (
-    "--unshare-all",
-    "--cap-drop",
-    "ALL",
-    "--unshare-user",
-    "--disable-userns",
-)  # The last two since bubblewrap 0.8.
+NAMESPACES = ("--unshare-all", "--cap-drop", "ALL", "--unshare-user", "--disable-userns")  # Last two: bubblewrap 0.8.
 LIMITS = 'ulimit -c 0; ulimit -n 512; ulimit -d "$1" && ulimit -f "$2" && shift 2 && exec "$@"'
 
 
 def wrap(
-    command: Sequence[str], scratch: str, readable: Sequence[str], memory: int, public: Sequence[Path] = ()
+    command: Sequence[str], scratch: str, readable: Sequence[str], memory: int, disk: int, public: Sequence[Path] = ()
 ) -> list[str]:
-    """The command with limits on memory and files [bytes], in a sandbox if one is available.
+    """The command with limits on memory and on files in `scratch` [bytes], in a sandbox if one is available.
 
-    `public` are the files of this package that the sandbox has; without them it has the package, and the simulator too.
+    Without a sandbox, `Process` measures the files. `public` are the files of this package that the sandbox has; if
+    there are none, it has the package, and the simulator too.
     """
     limited = ["/bin/sh", "-c", LIMITS, "agent", str(memory // 1024), str(LARGEST_FILE // 512), *command]
     if not Path("/bin/sh").exists():
         return list(command)
-    return [*_bubblewrap(scratch, readable, public), *limited] if is_available() else limited
+    return [*_bubblewrap(scratch, readable, disk, public), *limited] if is_available() else limited
 
 
 @cache
@@ -63,18 +66,19 @@ def _namespaces() -> tuple[str, ...]:
 
 
 def secret_files() -> list[Path]:
-    """The package's files of settings, experts and reaches."""
+    """The package's files of settings, experts and reaches, and the folder of published results in a wheel."""
     data = Path(__file__).resolve().parents[2] / "data"
     return sorted(file for file in data.iterdir() if file.name.startswith(SECRET))
 
 
-def _bubblewrap(scratch: str, readable: Sequence[str], public: Sequence[Path]) -> list[str]:
+def _bubblewrap(scratch: str, readable: Sequence[str], disk: int, public: Sequence[Path]) -> list[str]:
     """Folders first, then what hides parts of them, then files; at last, all that is left becomes read-only."""
     package = Path(__file__).resolve().parents[2]
-    code = (sys.base_prefix, sys.prefix, *map(str, _installed()), str(package.parent / "baselines"))
-    folders = [*PROGRAMS, *code]
+    python = [f"{prefix}/{part}" for prefix in (sys.base_prefix, sys.prefix) for part in PYTHON]
+    folders = [*PROGRAMS, *python, *map(str, _installed()), str(package.parent / "baselines")]
     folders += [path for path in readable if not Path(path).is_file()]
-    hidden = _hidden(package) if public else []
+    secrets = [] if public else secret_files()
+    hidden = _hidden(package) if public else [place for place in secrets if place.is_dir()]
     command = ["bwrap", *_namespaces(), "--die-with-parent", "--new-session", "--proc", "/proc", "--dev", "/dev"]
     command += ["--tmpfs", "/tmp"]
     for path in folders if public else [*folders, str(package)]:
@@ -83,12 +87,22 @@ def _bubblewrap(scratch: str, readable: Sequence[str], public: Sequence[Path]) -
         command += ["--tmpfs", str(folder)]
     for file in [*map(str, public), *(path for path in readable if Path(path).is_file())]:
         command += ["--ro-bind-try", file, file]
-    for file in [] if public else secret_files():
-        command += ["--ro-bind", "/dev/null", str(file)]
-    command += ["--bind", scratch, scratch, "--chdir", scratch]
+    for file in secrets:
+        command += ["--ro-bind", "/dev/null", str(file)] if file.is_file() else []
+    command += [*_scratch(scratch, disk), "--chdir", scratch]
     for folder in (*hidden, "/tmp", "/dev", "/"):
         command += ["--remount-ro", str(folder)]
     return [*command, "--"]
+
+
+def _scratch(folder: str, size: int) -> list[str]:
+    """Options for the folder that the agent may write: in memory, of a fixed size [bytes].
+
+    A size that the system enforces also counts files that cannot be seen from outside: without a name, or in a path
+    that is too long. Bubblewrap before 0.8 gets the folder itself, whose files `Process` measures.
+    """
+    is_recent = _namespaces() == NAMESPACES
+    return ["--size", str(size), "--tmpfs", folder] if is_recent else ["--bind", folder, folder]
 
 
 def _installed() -> list[Path]:

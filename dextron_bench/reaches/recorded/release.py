@@ -125,20 +125,25 @@ def _zip_reader(archive: zipfile.ZipFile, location: Path, manifest: Manifest) ->
         try:
             with archive.open(members[file]) as stream:
                 return _size_checked(file, stream.read(MAX_FILE + 1))
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
             raise ReleaseError(f"{file}: cannot be read from {location}: {error}") from error
 
     return reader
 
 
 def _check_member(file: str, info: zipfile.ZipInfo, members: dict[str, zipfile.ZipInfo]) -> None:
-    """Refuses duplicates, symbolic links, encrypted members and large ones; the release has none of these."""
+    """Refuses duplicates, symbolic links, encrypted members and large ones; the release has none of these.
+
+    Also refuses compression methods whose few bytes can fill the memory, whatever size they state.
+    """
     if file in members:
         raise ReleaseError(f"{file}: the archive has it twice ({members[file].filename}, {info.filename})")
     if stat.S_ISLNK(info.external_attr >> 16):
         raise ReleaseError(f"{file}: is a symbolic link in the archive")
     if info.flag_bits & 1:
         raise ReleaseError(f"{file}: is encrypted in the archive")
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ReleaseError(f"{file}: uses a compression method whose output size cannot be limited")
     if info.file_size > MAX_FILE:
         raise ReleaseError(f"{file}: unpacks to {info.file_size} bytes; the limit is {MAX_FILE}")
 

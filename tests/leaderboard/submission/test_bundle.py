@@ -184,6 +184,19 @@ def test_a_check_of_json_that_takes_too_long_is_refused(monkeypatch: pytest.Monk
         bundle.parse(b'{"seeds": [' + b"0," * 1_900_000 + b"0]}", "bundle", Path("mine.json"))
 
 
+@pytest.mark.parametrize(("place", "number"), [(12, 1_000_000), (16, 2**31), (16, 60)])
+def test_an_end_that_points_before_the_file_is_refused_by_name(place: int, number: int, tmp_path: Path):
+    """Size or position of the list of files; a reader that follows it seeks to a negative position."""
+    file = tmp_path / "mine.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("bundle.json", b"")
+    content, end = bytearray(file.read_bytes()), file.stat().st_size - 22
+    content[end + place : end + place + 4] = number.to_bytes(4, "little")
+    file.write_bytes(content)
+    with pytest.raises(bundle.BadBundle, match=r"mine\.zip is not a complete zip file"):
+        bundle.unpack(file, tmp_path / "opened")
+
+
 def test_a_long_list_of_files_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     file = tmp_path / "many.zip"
     with zipfile.ZipFile(file, "w") as archive:

@@ -30,6 +30,15 @@ def test_an_edited_result_is_refused(forged: Forgery):
     assert "'rank' was unexpected" in forged.checked().problems[0]
 
 
+def test_the_mean_returns_of_splits_that_were_played_are_compared():
+    """A result of a stranger may have more splits than were played."""
+    claimed = {"splits": {"test": {"scores": [20.0, 19.0]}, "train": {"scores": [20.0]}}}
+    computed = {"splits": {"test": {"scores": [19.0, 19.0]}, "hard": {"scores": [0.0]}}}
+    assert list(result_check.distant_returns(claimed, computed)) == [
+        "its result has a mean return of 19.50 on test; played again it is 19.00"
+    ]
+
+
 def test_a_machine_has_the_same_platform_as_itself(monkeypatch: pytest.MonkeyPatch):
     """The name of macOS has two forms."""
     monkeypatch.setattr("platform.platform", lambda *_: "macOS-14.5-arm64")

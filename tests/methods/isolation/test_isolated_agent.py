@@ -191,12 +191,13 @@ def test_an_agent_may_write_in_its_own_folder(agent_spec: Callable[[str], str]):
     assert [episode.failure for episode in play(agent_spec(act))] == [""] * 3
 
 
-def test_nan_fails_one_episode_and_a_crash_fails_the_current_episodes(agent_spec: Callable[[str], str]):
-    """With two slots the third episode begins after the crash, in a new process."""
+def test_nan_fails_one_episode_and_a_crash_fails_the_current_episodes(agent_spec: Callable[[str], str], tmp_path: Path):
+    """With two slots the third episode begins after the crash, alone, in a new process."""
     nan = play(agent_spec("a = np.zeros((len(states), 1)); a[0] = np.nan; return a"), CASES[:2])
     assert [episode.failure for episode in nan] == ["action is nan at step 0", ""]
-    act = "import os; os.path.exists('been') or (open('been', 'w').close(), os._exit(1)); " + CLOSES
-    first, second, third = play(agent_spec(act))
+    spec, file = agent_spec(f"import os; self.begun == 2 and os._exit(1); {CLOSES}"), tmp_path / "mine.py"
+    file.write_text(file.read_text().replace("pass", "self.begun = len(episodes)"))
+    first, second, third = play(spec)
     assert first.failure == second.failure == "it ended with code 1 at step 0"
     assert third.failure == ""
     assert len(third.actions) > 10
@@ -307,13 +308,21 @@ def writer(tmp_path: Path) -> Path:
             "import os; self.f = [os.memfd_create('m') for _ in range(8)]; [os.write(f, b'x' * 2**27) for f in self.f]",
             MEMORY,
         ),
-        ("[open(str(k), 'wb').write(b'x' * 2**25) for k in range(16)]", "MiB of files, more than 256"),
     ],
 )
-def test_memory_that_is_shared_and_files_end_the_agent(act: str, why: str, agent_spec: Callable[[str], str]):
-    limits = {"answer": 30.0, "memory": 768 * 2**20, "disk": 256 * 2**20}
+def test_memory_that_is_shared_ends_the_agent(act: str, why: str, agent_spec: Callable[[str], str]):
+    limits = {"answer": 30.0, "memory": 768 * 2**20}
     (episode,) = play(agent_spec(f"{act}; import time; time.sleep(20)"), CASES[:1], **limits)
     assert why in episode.failure
+
+
+def test_without_a_sandbox_the_size_of_files_is_measured(
+    agent_spec: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(sandbox, "is_available", lambda: False)
+    act = "[open(str(k), 'wb').write(b'x' * 2**25) for k in range(16)]; import time; time.sleep(20)"
+    (episode,) = play(agent_spec(act), CASES[:1], answer=30.0, disk=256 * 2**20)
+    assert "MiB of files, more than 256" in episode.failure
 
 
 @pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
@@ -365,7 +374,7 @@ def test_without_a_sandbox_no_policy_file_starts_unless_it_is_trusted(
     with pytest.raises(NoSandbox, match="add --trust"), IsolatedAgent(prepare_launch(str(file))) as agent:
         agent.act(np.zeros((1, 48)))
     assert not writer.with_name("stolen").exists()
-    assert prepare_launch(str(file), trust=True).command_line("/", 2**30)[0] != "bwrap"
+    assert prepare_launch(str(file), trust=True).command_line("/", 2**30, 2**30)[0] != "bwrap"
 
 
 def test_onnx_policies_play_and_other_files_do_not(tmp_path: Path):

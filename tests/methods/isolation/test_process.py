@@ -42,3 +42,13 @@ def test_the_threads_of_a_process_that_writes_too_much_end_with_it(tmp_path: Pat
     while threading.active_count() > before and time.monotonic() < deadline:
         time.sleep(0.01)
     assert threading.active_count() <= before
+
+
+def test_the_last_line_of_a_failed_process_is_short_and_printable(tmp_path: Path):
+    """A bundle with a longer text, or with one that drives a terminal, is refused."""
+    process = start("import sys; sys.exit('x' * 900 + '\x1b[2J' + 'y' * 100)", tmp_path)
+    with pytest.raises(NoAnswer, match="it ended") as caught:
+        process.ask(b"first\n", 60.0)
+    message = process.describe_failure(caught.value)
+    assert message == "it ended with code 1: " + "x" * 393 + "\\x1b[2J" + "y" * 100
+    process.kill()

@@ -164,6 +164,14 @@ def test_a_zip_bomb_with_a_false_size_is_refused(small_release: SmallRelease):
     assert import_error(file, small_release).startswith(FILE)
 
 
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_compression_method_without_a_size_limit_is_refused(small_release: SmallRelease, method: int):
+    """A kilobyte of it can fill the memory before its size is known."""
+    content = small_release.files[FILE]
+    file = zip_with(small_release, lambda archive: archive.writestr("dextron-abc/data/" + FILE, content, method))
+    assert f"{FILE}: uses a compression method" in import_error(file, small_release)
+
+
 def test_a_large_file_in_a_folder_is_refused(small_release: SmallRelease):
     top = small_release.unpacked()
     (top / "data" / FILE).write_bytes(bytes(MAX_FILE + 1))
