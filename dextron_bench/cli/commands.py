@@ -17,6 +17,7 @@ from dextron_bench.cli import (
     leaderboard_verify,
     mc,
     new_agent,
+    plan,
     rebuild,
     recordings,
     recordings_choose,
@@ -57,6 +58,7 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "check": check.Check,
     "submit": submit.Submit,
     "compare": compare.Compare,
+    "plan": plan.Plan,
     "view": view.View,
     "recordings": (
         "Recordings: list them, export one as a film or a table, choose a few from the runs.",

@@ -1,4 +1,4 @@
-"""`dextron-bench compare`: compares two methods on the settings that both played."""
+"""`dextron-bench compare`: compares methods on the settings that all of them played."""
 
 from __future__ import annotations
 
@@ -20,17 +20,31 @@ if TYPE_CHECKING:
     from dextron_bench.scores.paired import Difference
 
 DIFFERENCE = "B - A [95 %]"
+HOLM = "p (Holm)"  # The heading of p values that are corrected for their number.
 SHOWN = 5  # How many settings are listed that more seeds of B solve, and that fewer do.
+
+
+class OnlyForTwo(ValueError):
+    """A flag that needs exactly two methods."""
 
 
 @dataclass(frozen=True)
 class Compare:
-    """Compare two methods on equal settings: how much more B scores than A, with its 95 % interval.
+    """Compare methods on equal settings: how much more B scores than A, with its 95 % interval.
 
     A and B are names on the leaderboard, found in --runs or else among the published results. They can also be paths:
-    a result.json, the folder of a run, or the folder of a method's runs. docs/statistics.md explains the numbers.
+    a result.json, the folder of a run, or the folder of a method's runs. With three methods or more, the table has
+    all pairs, and its p values are corrected for their number. docs/statistics.md explains the numbers.
+
+    With --sequential, A and B need not have been evaluated. A method without a result plays the settings in a frozen
+    random order and stops when the difference is decided. It is named as for `eval`: a method, module:Class,
+    file.py:Class, a label with shipped weights, or a file of weights.
 
     Example: dextron-bench compare rlil-0.1-quick rlil-0.1 --reaches real --into difference.png
+
+    Example: dextron-bench compare reflex omega bc rlil-0.1 --reaches real
+
+    Example: dextron-bench compare reflex my_agent.py:MyAgent --sequential
 
     Example: dextron-bench compare old/ours/synthetic runs/ours/synthetic --fail-if-worse
     """
@@ -39,31 +53,61 @@ class Compare:
     """The method to compare with: a label or a path."""
     b: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="B")]
     """The method that may be better or worse: a label or a path."""
+    others: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="C")] = ()
+    """More methods: then all pairs are compared."""
     split: str = "test"
-    """The split that both played."""
+    """The split that all played."""
     reaches: SourceName | None = None
-    """The source of reaches; needed only if both have results on several."""
+    """The source of reaches; needed only if the methods have results on several. With --sequential: synthetic."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
     """Also draw the differences into this file."""
     fail_if_worse: bool = False
     """Exit with code 1 if B is worse beyond noise: if the whole interval of the difference B - A is below 0."""
+    sequential: bool = False
+    """Play the settings in a frozen random order, and stop when the difference is decided."""
+    seed: tuple[int, ...] = ()
+    """With --sequential: the seeds of the agents that play; by default all with shipped weights, else 0."""
+    threads: int = 0
+    """With --sequential: threads of the simulation; 0 means one per processor."""
+    quiet: bool = False
+    """With --sequential: show no progress."""
     json: bool = False
     """Print everything as JSON, with all settings whose outcome differs."""
 
     def __call__(self) -> int:
+        if self.sequential:
+            return self._compare_in_order()
         from dextron_bench.runs import result_files
         from dextron_bench.scores import comparison
 
-        results = result_files.find(self.a, self.runs), result_files.find(self.b, self.runs)
-        result = comparison.compare(*comparison.align((self.a, self.b), results, self.split, self.reaches))
+        if self.others and (self.into is not None or self.fail_if_worse):
+            raise OnlyForTwo("--into and --fail-if-worse need two methods, not more")
+        names = (self.a, self.b, *self.others)
+        results = [result_files.find(name, self.runs) for name in names]
+        methods = comparison.align_all(names, results, self.split, self.reaches)
+        if self.others:
+            from dextron_bench.cli import compare_pairs
+
+            return compare_pairs.compare(self, methods)
+        result = comparison.compare(*methods)
         if self.into is not None:
             from dextron_bench.scores import figures
 
             figures.differences(result, self.into)
         print_json(as_dict(result)) if self.json else _print(result)
         return DIFFERS if self.fail_if_worse and result.score.is_worse else DONE
+
+    def _compare_in_order(self) -> int:
+        """Compares two methods row by row, until the difference is decided."""
+        from dextron_bench.cli import compare_sequential
+        from dextron_bench.splits.loading import load_split
+
+        if self.others or self.into is not None:
+            raise OnlyForTwo("--sequential compares two methods, and draws no picture")
+        split = load_split(self.reaches or "synthetic", self.split)
+        return compare_sequential.compare(self, split)
 
 
 def as_dict(comparison: Comparison) -> dict[str, Any]:
@@ -86,10 +130,12 @@ def _print(comparison: Comparison) -> None:
     _print_flips(comparison.flips, comparison.a.scores.shape[1])
     print(f"McNemar's exact test: p = {comparison.p_value:.3g}")
     rows = [
-        [row["group"], row["rows"], f"{row['a']:.2f}", f"{row['b']:.2f}", _difference_text(row)]
+        [row["group"], row["rows"], f"{row['a']:.2f}", f"{row['b']:.2f}", difference_text(row), f"{row['p_holm']:.2g}"]
         for row in comparison.groups.to_dict("records")
     ]
-    print_table("mean return by group of settings", ["group", "rows", "A", "B", DIFFERENCE], rows)
+    print_table("mean return by group of settings", ["group", "rows", "A", "B", DIFFERENCE, HOLM], rows)
+    if len(rows) > 1:
+        print(f"{HOLM} is corrected for the number of groups; the line `{rows[0][0]}` is not one of them")
 
 
 def _print_scores(comparison: Comparison) -> None:
@@ -118,9 +164,10 @@ def _print_flips(flips: pd.DataFrame, settings: int) -> None:
 
 def _difference_cells(difference: Difference, unit: float) -> tuple[str, str]:
     scaled = {"difference": difference.mean, "low": difference.low, "high": difference.high}
-    text = _difference_text({name: unit * value for name, value in scaled.items()})
+    text = difference_text({name: unit * value for name, value in scaled.items()})
     return text, f"{unit * difference.detectable:.2f}"
 
 
-def _difference_text(row: Mapping[Any, Any]) -> str:
+def difference_text(row: Mapping[Any, Any]) -> str:
+    """The entries `difference`, `low` and `high` of a row, with two digits."""
     return f"{row['difference']:+.2f} [{row['low']:+.2f}, {row['high']:+.2f}]"

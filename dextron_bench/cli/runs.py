@@ -225,8 +225,6 @@ def _shown(value: Any, name: str) -> str:
 
 def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     """A row for each split, with each run's mean return and its interval."""
-    import numpy as np
-
     from dextron_bench.scores import statistics
 
     rows = []
@@ -234,7 +232,7 @@ def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
         row = {"split": split}
         for entry in entries:
             if split in entry.scores:
-                score = statistics.estimate(entry.scores[split], np.random.default_rng(0))
+                score = statistics.estimate(entry.scores[split])
                 row[entry.name] = f"{score.mean:.2f} [{score.low:.2f}, {score.high:.2f}]"
         rows.append({"split": split, **{entry.name: row.get(entry.name) for entry in entries}})
     return rows

@@ -15,6 +15,7 @@ from dextron_bench.storage import hashing, tensors
 from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
+SUFFIX = ".safetensors"
 METADATA = ("label", "reaches", "seeds", "epochs", "best_epoch", "frames")  # What a result copies from its weights.
 
 
@@ -86,7 +87,16 @@ def load_agent(learner: Learner, file: Path) -> Agent:
 
 
 def load_agent_from_file(file: Path) -> Agent:
-    """The agent of a file that names its own method; raises BadWeights, BadSettings, BadTensors, OSError.
+    """The agent of a file that names its own method; raises BadWeights, BadSettings, BadTensors, OSError."""
+    method, settings = maker_of(file)
+    learner = registry.create(method, settings)
+    if not isinstance(learner, Learner):
+        raise BadWeights(f"{file} says it holds weights of {method!r}, which has none")
+    return load_agent(learner, file)
+
+
+def maker_of(file: Path) -> tuple[str, dict[str, Any]]:
+    """The method and the settings that a file of weights names; raises BadWeights, BadTensors, OSError.
 
     The method must be installed: a file may come from a stranger, so its metadata never makes other code run.
     """
@@ -98,10 +108,7 @@ def load_agent_from_file(file: Path) -> Agent:
             f"{file} says it holds weights of {header['method']!r}, which is not installed; a file of weights never "
             f"imports code: choose from {', '.join(registry.installed_methods())}, or register it (CONTRIBUTING.md)"
         )
-    learner = registry.create(header["method"], header["settings"])
-    if not isinstance(learner, Learner):
-        raise BadWeights(f"{file} says it holds weights of {header['method']!r}, which has none")
-    return load_agent(learner, file)
+    return header["method"], header["settings"]
 
 
 def agent_by_name(name: str, reaches: str, seed: int = 0) -> tuple[str, Agent]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench.scores import paired
+from dextron_bench.scores import paired, statistics
 from dextron_bench.splits import strata
 from dextron_bench.storage import provenance
 from dextron_bench.world import task
@@ -39,7 +40,8 @@ class Comparison:
 
     `flips` has a row for each setting with a different outcome: `row`, `gained` (by B), the shares of seeds that solve
     it, `a` and `b`, and `subject`, `ring` and `angle` if the split ships. `groups` has a row for ALL settings, for each
-    subject and for each start region: `group`, `rows`, mean returns `a` and `b`, `difference`, `low`, `high`.
+    subject and for each start region: `group`, `rows`, mean returns `a` and `b`, `difference`, `low`, `high`,
+    `p_value`, and `p_holm`, which is corrected for all rows but the first.
     """
 
     a: SeedScores
@@ -54,17 +56,48 @@ class Comparison:
 def compare(a: SeedScores, b: SeedScores) -> Comparison:
     """Compares two methods that `align` put on the same settings. Raises DamagedSplit."""
     rows = strata.shipped_strata(a.reaches, a.split, a.digest)
-    solved_a, solved_b = a.scores == task.SUCCESS, b.scores == task.SUCCESS
-    flips = paired.flips(solved_a, solved_b)
+    solved_a, solved_b = _solved(a), _solved(b)
+    flips = paired.flips(solved_a > 0.0, solved_b > 0.0)
     return Comparison(
         a,
         b,
-        paired.published_difference(a.scores, b.scores),
-        paired.published_difference(solved_a.astype(float), solved_b.astype(float)),
+        paired.difference(a.scores, b.scores),
+        paired.difference(solved_a, solved_b, statistics.SHARES),
         flips.p_value,
         _flip_table(flips, solved_a, solved_b, rows),
-        pd.DataFrame(_groups(a.scores, b.scores, rows)),
+        _with_holm(pd.DataFrame(_groups(a.scores, b.scores, rows)), first=1),
     )
+
+
+def pairs(methods: Sequence[SeedScores]) -> pd.DataFrame:
+    """A row for each pair of methods that `align` put on the same settings, `a` before `b` as they are given.
+
+    `difference` is how much more B scores, with `low` and `high`, its `p_value`, and `p_holm`, corrected for all
+    pairs. `success`, `success_low` and `success_high` are the same in success rate (of 1).
+    """
+    return _with_holm(pd.DataFrame(_pair(a, b) for a, b in itertools.combinations(methods, 2)))
+
+
+def _pair(a: SeedScores, b: SeedScores) -> dict[str, str | float]:
+    success = paired.difference(_solved(a), _solved(b), statistics.SHARES)
+    ends = {"success": success.mean, "success_low": success.low, "success_high": success.high}
+    return {"a": a.name, "b": b.name, **_difference(paired.difference(a.scores, b.scores)), **ends}
+
+
+def _difference(difference: paired.Difference) -> dict[str, float]:
+    ends = {"difference": difference.mean, "low": difference.low, "high": difference.high}
+    return {**ends, "p_value": difference.p_value}
+
+
+def _solved(method: SeedScores) -> np.ndarray:
+    """Successes (seeds, settings) as 0 and 1."""
+    return np.equal(method.scores, task.SUCCESS).astype(float)
+
+
+def _with_holm(table: pd.DataFrame, first: int = 0) -> pd.DataFrame:
+    """The table with `p_holm`: the p values corrected together from row `first` on, and unchanged before it."""
+    p_values = table["p_value"].tolist()
+    return table.assign(p_holm=[*p_values[:first], *paired.holm(p_values[first:])])
 
 
 def _flip_table(
@@ -83,10 +116,19 @@ def _groups(a: np.ndarray, b: np.ndarray, rows: pd.DataFrame | None) -> Iterator
         regions = "ring " + rows["ring"].astype(str) + ", angle " + rows["angle"].astype(str)
         groups |= {str(name): members for name, members in sorted(rows.groupby(regions).indices.items())}
     for name, members in groups.items():
-        difference = paired.published_difference(a[:, members], b[:, members])
+        difference = _difference(paired.difference(a[:, members], b[:, members]))
         means = {"a": float(a[:, members].mean()), "b": float(b[:, members].mean())}
-        interval = {"difference": difference.mean, "low": difference.low, "high": difference.high}
-        yield {"group": name, "rows": len(members), **means, **interval}
+        yield {"group": name, "rows": len(members), **means, **difference}
+
+
+def align_all(names: Sequence[str], results: Sequence[Results], split: str, reaches: str | None) -> list[SeedScores]:
+    """The scores of two or more methods on the same settings; raises Incomparable, as `align` does."""
+    first, second = align((names[0], names[1]), (results[0], results[1]), split, reaches)
+    others = zip(names[2:], results[2:], strict=True)
+    return [
+        *(first, second),
+        *(align((first.name, name), (results[0], seeds), split, first.reaches)[1] for name, seeds in others),
+    ]
 
 
 def align(

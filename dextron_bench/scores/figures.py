@@ -18,6 +18,7 @@ from matplotlib.patches import Circle
 from mpl_toolkits.mplot3d import Axes3D
 
 from dextron_bench.reaches.setting import Setting, Source, Stratum, from_frame
+from dextron_bench.scores.paired import SIGNIFICANT
 from dextron_bench.storage import atomic
 
 if TYPE_CHECKING:
@@ -164,14 +165,14 @@ def ridges(episodes: dict[str, PredictedEpisode], file: Path) -> None:
 def differences(comparison: Comparison, file: Path) -> None:
     """Draws how much more B scores than A: mean and interval of each group, and all settings in order of difference.
 
-    Blue means better, orange worse, grey not significant. Raises UnknownFormat, OSError.
+    Blue means better, orange worse, grey not significant after Holm's correction. Raises UnknownFormat, OSError.
     """
     _check_format(file)
     groups = comparison.groups.iloc[::-1]
     figure = Figure(figsize=(10, 1.5 + 0.22 * max(len(groups), 12)), layout="constrained")
     left, right = figure.subplots(1, 2)
     for height, row in enumerate(groups.to_dict("records")):
-        colour = BETTER if row["low"] > 0.0 else WORSE if row["high"] < 0.0 else "0.5"
+        colour = "0.5" if row["p_holm"] > SIGNIFICANT else BETTER if row["difference"] > 0.0 else WORSE
         left.plot([row["low"], row["high"]], [height, height], color=colour, linewidth=2)
         left.plot(row["difference"], height, "o", color=colour, markersize=4)
     left.set_yticks(range(len(groups)), [f"{row.group} ({row.rows})" for row in groups.itertuples()], fontsize=8)

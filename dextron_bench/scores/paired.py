@@ -5,6 +5,7 @@ Scores are arrays (seeds, settings). A column is the same setting for all method
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
@@ -12,16 +13,22 @@ import numpy as np
 from scipy.stats import binomtest, norm
 
 from dextron_bench.scores import statistics
+from dextron_bench.scores.statistics import RETURNS, Bounds, Part
 
 NOISE = 3.29  # Standard errors; a difference due to chance exceeds them once in two thousand times.
+SIGNIFICANT = 1.0 - statistics.LEVEL  # The largest p value that counts as a difference.
 POWER = 0.8  # Chance that a difference of the size `detectable` is significant.
 
 
 @dataclass(frozen=True, slots=True)
 class Difference(statistics.Estimate):
-    """How much more B scores than A, with its 95 % interval and the smallest difference that the test can detect."""
+    """How much more B scores than A, with its 95 % interval and the smallest difference that the test can detect.
+
+    `p_value` is the smallest level at which the difference is significant: below 0.05 if the interval excludes 0.
+    """
 
     detectable: float
+    p_value: float
 
     @property
     def is_worse(self) -> bool:
@@ -41,29 +48,54 @@ class Flips:
     p_value: float
 
 
-def difference(a: np.ndarray, b: np.ndarray, rng: np.random.Generator, same_settings: bool = True) -> Difference:
-    """Mean of scores B minus mean of scores A, both (seeds, settings), by a bootstrap of the difference.
+def difference(a: np.ndarray, b: np.ndarray, bounds: Bounds = RETURNS, same_settings: bool = True) -> Difference:
+    """Mean of scores B minus mean of scores A, both (seeds, settings), with the interval that ranks and `compare` use.
 
-    Each resample draws settings once for both methods, and seeds for each method separately. Equal generators give
-    opposite differences for (a, b) and (b, a). Without `same_settings`, it draws the settings of each separately, too.
+    The parts of its variance are the differences of settings and, for a method with several seeds, these seeds.
+    Without `same_settings` the settings of each method are a part of their own. `bounds` are the smallest and the
+    largest possible score. (b, a) gives the opposite of (a, b), and equal scores give equal bits.
     """
-    settings = statistics.draw_counts(a.shape[1], rng) if same_settings else None
-    swap = b.tobytes() < a.tobytes()  # The order of the draws must not depend on which method is called A.
-    first, second = (_resampled(scores, settings, rng) for scores in ((b, a) if swap else (a, b)))
-    resamples = first - second if swap else second - first
-    estimate = statistics.interval(float(b.mean() - a.mean()), resamples)
-    return Difference(estimate.mean, estimate.low, estimate.high, detectable(resamples))
+    seeds = pooled([*statistics.parts_of_seeds(a), *statistics.parts_of_seeds(b)])
+    if same_settings:
+        sums = len(a) * b.sum(axis=0) - len(b) * a.sum(axis=0)
+        settings = [statistics.part_of_mean(sums, len(a) * len(b))]
+    else:
+        settings = [statistics.part_of_settings(a), statistics.part_of_settings(b)]
+    parts = [*settings, *seeds]
+    mean = float(b.mean() - a.mean())
+    estimate = statistics.interval(mean, parts, _bounds_of_difference(bounds))
+    return Difference(estimate.mean, estimate.low, estimate.high, detectable(parts), statistics.p_value(mean, parts))
 
 
-def _resampled(scores: np.ndarray, settings: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
-    """Means of resamples with given counts of settings, or with counts that are drawn here."""
-    counts = statistics.draw_counts(scores.shape[1], rng) if settings is None else settings
-    return statistics.resampled_means(scores, counts, rng)
+def _bounds_of_difference(bounds: Bounds) -> Bounds:
+    return bounds[0] - bounds[1], bounds[1] - bounds[0]
 
 
-def published_difference(a: np.ndarray, b: np.ndarray, same_settings: bool = True) -> Difference:
-    """The difference that ranks and `compare` use: equal scores give the same interval everywhere."""
-    return difference(a, b, np.random.default_rng(0), same_settings)
+def pooled(seeds: Sequence[Part]) -> list[Part]:
+    """One part for the seeds of both methods, with Welch's degrees of freedom; none if no method has several seeds."""
+    variance = math.fsum(part.variance for part in seeds)
+    if variance == 0.0:
+        return []
+    return [Part(variance, variance**2 / math.fsum(part.variance**2 / part.freedom for part in seeds))]
+
+
+def detectable(parts: Sequence[Part]) -> float:
+    """The smallest true difference that a test at 5 % detects with a chance of 80 %, given the noise.
+
+    The size is half the width of the interval and 0.84 standard errors: 2.8 standard errors if no seeds differ.
+    Infinite for one setting.
+    """
+    return statistics.half_width(parts) + float(norm.ppf(POWER)) * statistics.standard_error(parts)
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Holm's correction: with all of them at most 5 %, the chance of any false one is at most 5 % (Holm, 1979)."""
+    order = sorted(range(len(p_values)), key=lambda place: p_values[place])
+    corrected, largest = [1.0] * len(p_values), 0.0
+    for position, place in enumerate(order):
+        largest = max(largest, min(1.0, (len(p_values) - position) * p_values[place]))
+        corrected[place] = largest
+    return corrected
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,28 +108,18 @@ class Gap(statistics.Estimate):
     is_beyond_noise: bool
 
 
-def gap(known: np.ndarray, fresh: np.ndarray, rng: np.random.Generator) -> Gap:
+def gap(known: np.ndarray, fresh: np.ndarray) -> Gap:
     """Mean of scores on known settings minus mean on fresh settings, both (seeds, settings) of one method.
 
-    Each resample draws the two kinds of settings independently, and the same seeds for both.
+    The parts of its variance are the settings of both kinds and, if there are several seeds, the gaps of these seeds.
     """
-    seeds = statistics.draw_counts(len(known), rng)
-    known_means, fresh_means = (
-        (seeds * (statistics.draw_counts(scores.shape[1], rng) @ scores.T)).sum(axis=1) / scores.size
-        for scores in (known, fresh)
-    )
-    resamples = known_means - fresh_means
-    estimate = statistics.interval(float(known.mean() - fresh.mean()), resamples)
-    beyond = estimate.mean > NOISE * float(resamples.std())
+    parts = [statistics.part_of_settings(known), statistics.part_of_settings(fresh)]
+    if len(known) > 1:
+        sums = fresh.shape[1] * known.sum(axis=1) - known.shape[1] * fresh.sum(axis=1)
+        parts.append(statistics.part_of_mean(sums, known.shape[1] * fresh.shape[1]))
+    estimate = statistics.interval(float(known.mean() - fresh.mean()), parts, _bounds_of_difference(RETURNS))
+    beyond = estimate.mean > NOISE * statistics.standard_error(parts)
     return Gap(estimate.mean, estimate.low, estimate.high, beyond)
-
-
-def detectable(resamples: np.ndarray) -> float:
-    """The smallest true difference that a test at 5 % detects with a chance of 80 %, given the noise of the resamples.
-
-    The size is 2.8 standard errors. `resamples` (RESAMPLES,) are resamples of the difference.
-    """
-    return float((norm.ppf(1.0 - statistics.TAIL) + norm.ppf(POWER)) * resamples.std())
 
 
 def flips(a: np.ndarray, b: np.ndarray) -> Flips:
@@ -118,7 +140,7 @@ def ranks(scores: Sequence[np.ndarray], own_settings: Collection[int] = ()) -> l
     """Ranks from 1; methods that do not differ significantly from the best of their group share its rank.
 
     Methods are taken from the highest mean down. A method starts a new group if the interval of its
-    `published_difference` from the first method of the current group excludes 0; its rank is then its position.
+    `difference` from the first method of the current group excludes 0; its rank is then its position.
     Each entry of `scores` is (seeds, settings) on the same settings; those at the places `own_settings` are on settings
     that no other method has. Equal means are ordered by their scores, so the
     order of the input does not matter.
@@ -127,7 +149,7 @@ def ranks(scores: Sequence[np.ndarray], own_settings: Collection[int] = ()) -> l
     method_ranks, rank, leader = [0] * len(scores), 0, -1
     for position, method in enumerate(order, start=1):
         same = method not in own_settings and leader not in own_settings
-        if rank == 0 or _is_significant(published_difference(scores[leader], scores[method], same)):
+        if rank == 0 or _is_significant(difference(scores[leader], scores[method], same_settings=same)):
             leader, rank = method, position
         method_ranks[method] = rank
     return method_ranks

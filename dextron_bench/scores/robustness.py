@@ -64,7 +64,7 @@ def _robustness(reaches: str, split: str, method: str, seeds: list[Mapping[str, 
         if both:
             under, without = (np.array(part, float) for part in zip(*both, strict=True))
             returns[track] = float(under.mean())
-            losses[track] = statistics.estimate(without - under, np.random.default_rng(0))
+            losses[track] = statistics.estimate(without - under, (-task.SUCCESS, task.SUCCESS))
     return Robustness(reaches, split, method, float(plain.mean()), returns, losses, area(float(plain.mean()), returns))
 
 

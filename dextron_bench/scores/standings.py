@@ -88,7 +88,6 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
             f"{', '.join(map(str, sorted(lengths)))}"
         )
     scores = {method: np.array([seed["scores"] for seed in seeds], float) for method, seeds in board.items()}
-    settings = statistics.draw_counts(lengths.pop(), np.random.default_rng(0))
     fresh = {method: _fresh(method, seeds, scores[method]) for method, seeds in board.items()}
     marked = {method: known.scores for method, known in fresh.items() if known and known.gap.is_beyond_noise}
     ranked = [method for method in scores if is_ranked(method, reaches)]
@@ -100,7 +99,7 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
         yield {
             **{"reaches": reaches, "split": split, "version": digest[:8]},
             **{"rank": ranks.get(method, np.nan), "method": method, "seeds": len(returns), "episodes": returns.size},
-            **_estimates(method, returns, settings, regions),
+            **_estimates(method, returns, regions),
             "regret": ceiling - returns.mean(),
             **_endings(board[method]),
             **_fresh_columns(method, fresh[method]),
@@ -113,24 +112,21 @@ def _fresh(method: str, seeds: Sequence[dict[str, Any]], known: np.ndarray) -> F
     if None in played or len({one["digest"] for one in played}) > 1:
         return None
     scores = np.array([one["scores"] for one in played], float)
-    return Fresh(scores, paired.gap(known, scores, _method_rng(method)))
+    return Fresh(scores, paired.gap(known, scores))
 
 
 def _fresh_columns(method: str, fresh: Fresh | None) -> dict[str, Any]:
     """Mean return on fresh settings and gap with their intervals, and whether the gap is beyond noise."""
     if fresh is None:
         return {"marked": False}
-    estimates = {"fresh": statistics.estimate(fresh.scores, _method_rng(method)), "gap": fresh.gap}
+    estimates = {"fresh": statistics.estimate(fresh.scores), "gap": fresh.gap}
     return {"marked": fresh.gap.is_beyond_noise} | _with_ends(estimates)
 
 
-def _estimates(method: str, returns: np.ndarray, settings: np.ndarray, regions: np.ndarray | None) -> dict[str, float]:
+def _estimates(method: str, returns: np.ndarray, regions: np.ndarray | None) -> dict[str, float]:
     """Return, success and interquartile mean of a method with their intervals; the latter only with `regions`."""
     solved = np.equal(returns, task.SUCCESS).astype(float)
-    estimates = {
-        name: statistics.estimate(values, _method_rng(method), settings)
-        for name, values in (("return", returns), ("success", solved))
-    }
+    estimates = {"return": statistics.estimate(returns), "success": statistics.estimate(solved, statistics.SHARES)}
     if regions is not None:
         estimates["iqm"] = statistics.interquartile_mean(returns, regions, _method_rng(method))
     return _with_ends(estimates)

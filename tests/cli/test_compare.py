@@ -111,6 +111,39 @@ def test_the_printed_text_has_rows_and_numbers(here: Path, capsys: pytest.Captur
     assert "p = 4.01e-05" in printed
 
 
+def test_groups_have_p_values_that_are_corrected_for_their_number(compared: Callable[..., dict[str, Any]]):
+    total, *groups = compared("good", "bad")["groups"]
+    assert total["p_holm"] == total["p_value"] < 0.05
+    smallest = min(groups, key=lambda group: group["p_value"])
+    assert smallest["p_holm"] == pytest.approx(min(1.0, len(groups) * smallest["p_value"]))
+    assert all(group["p_value"] <= group["p_holm"] <= 1.0 for group in groups)
+
+
+def test_three_methods_are_compared_in_pairs(compared: Callable[..., dict[str, Any]], here: Path):
+    """`good` and `same` have equal scores; the other two p values are equal, and the smallest counts three times."""
+    write(here / "runs", "same", np.where(np.arange(ROWS) < 2, 0.0, 20.0))
+    result = compared("good", "bad", "same")
+    assert result["seeds"] == {"good": 1, "bad": 1, "same": 1}
+    pairs = {(pair["a"], pair["b"]): pair for pair in result["pairs"]}
+    assert list(pairs) == [("good", "bad"), ("good", "same"), ("bad", "same")]
+    assert [pair["difference"] for pair in result["pairs"]] == pytest.approx([-0.72, 0.0, 0.72])
+    assert [pair["success"] for pair in result["pairs"]] == pytest.approx([-0.036, 0.0, 0.036])
+    first = pairs["good", "bad"]
+    assert first["p_value"] == pairs["bad", "same"]["p_value"] < 0.001
+    assert first["p_holm"] == pytest.approx(3 * first["p_value"])
+    assert pairs["good", "same"]["p_holm"] == 1.0
+
+
+def test_the_table_of_pairs_says_which_methods_differ(here: Path, capsys: pytest.CaptureFixture[str]):
+    write(here / "runs", "same", np.where(np.arange(ROWS) < 2, 0.0, 20.0))
+    assert main.main(["compare", "good", "bad", "same"]) == 0
+    printed = capsys.readouterr().out
+    assert "3 pairs; p (Holm) is corrected for all of them" in printed
+    assert [line.rstrip(" │").split("│")[-1].strip() for line in printed.splitlines()[-4:-1]] == [
+        *("differ", "within noise", "differ")
+    ]
+
+
 def test_published_results_are_used_if_there_is_no_run(compared: Callable[..., dict[str, Any]], here: Path):
     write(here / "published", "good", [0.0] * ROWS)
     write(here / "published", "published", [20.0] * ROWS)
@@ -169,6 +202,8 @@ def test_an_impossible_comparison_is_one_line_on_stderr(here: Path, complaint: C
         ("good", "bad", "--split", "val"): "good, seed 0, has no split 'val' of real reaches; it has test",
         ("good", "bad", "--into", "difference.gif"): "no picture format '.gif'",
         ("good",): "required",
+        ("good", "bad", "short"): "played different versions of test of real reaches",
+        ("good", "bad", "good", "--fail-if-worse"): "--into and --fail-if-worse need two methods, not more",
     }
     for arguments, line in expected.items():
         assert line in complaint("compare", *arguments)

@@ -287,6 +287,7 @@ def test_products_of_numpy_use_one_thread_by_default():
         ["run"],
         ["eval"],
         ["compare"],
+        ["plan"],
         ["success", "data"],
         ["success", "train"],
         ["success", "eval"],

@@ -18,10 +18,6 @@ def scores(seeds: int) -> st.SearchStrategy[np.ndarray]:
     return arrays(float, (seeds, ROWS), elements=RETURNS)
 
 
-def rng() -> np.random.Generator:
-    return np.random.default_rng(0)
-
-
 def solved(*rows: str) -> np.ndarray:
     """Successes (seeds, settings) written as ones and zeros."""
     return np.array([[letter == "1" for letter in row] for row in rows])
@@ -29,48 +25,69 @@ def solved(*rows: str) -> np.ndarray:
 
 def test_a_constant_lead_is_certain_even_if_settings_differ_much():
     a = np.array([[0.0, 5.0, 19.0, 3.0]])
-    result = paired.difference(a, a + 1.0, rng())
+    result = paired.difference(a, a + 1.0)
     assert (result.mean, result.low, result.high, result.detectable) == pytest.approx((1.0, 1.0, 1.0, 0.0), abs=1e-12)
 
 
 def test_the_difference_is_between_means_over_seeds_and_settings():
     a, b = np.array([[0.0, 10.0], [20.0, 10.0]]), np.array([[10.0, 20.0]])
-    assert paired.difference(a, b, rng()).mean == 5.0
+    assert paired.difference(a, b).mean == 5.0
 
 
 def test_the_interval_is_the_normal_one_of_differences_over_many_settings():
     noise = np.random.default_rng(1)
     a = noise.normal(10.0, 6.0, (1, 400))
     b = a + noise.normal(0.5, 2.0, (1, 400))
-    result, error = paired.difference(a, b, rng()), (b - a).std() / 20.0
+    result, error = paired.difference(a, b), (b - a).std() / 20.0
     assert result.high - result.low == pytest.approx(2 * 1.96 * error, rel=0.05)
     assert result.detectable == pytest.approx((1.96 + 0.84) * error, rel=0.05)
 
 
 def test_seeds_of_two_methods_are_drawn_independently():
     """A and B have the same three seeds. If they were drawn together, the difference would always be 0."""
-    a = np.array([[0.0], [10.0], [20.0]]) + np.zeros((1, 20))
-    result = paired.difference(a, a, rng())
-    assert result.low < -8.0
-    assert result.high > 8.0
+    a = np.array([[9.0], [10.0], [11.0]]) + np.zeros((1, 20))
+    result = paired.difference(a, a)
+    half = 2.7764 * np.sqrt(2.0 / 3.0)  # Student's t of 2 + 2 degrees of freedom.
+    assert (result.low, result.high) == pytest.approx((-half, half), rel=1e-4)
 
 
 @pytest.mark.parametrize(("lead", "worse"), [(-2.0, True), (0.0, False), (2.0, False)])
 def test_worse_means_that_the_whole_interval_is_below_0(lead: float, worse: bool):
     a = np.random.default_rng(2).normal(10.0, 1.0, (1, 100))
     b = a + lead + np.random.default_rng(3).normal(0.0, 1.0, (1, 100))
-    assert paired.difference(a, b, rng()).is_worse == worse
+    assert paired.difference(a, b).is_worse == worse
 
 
 @settings(max_examples=25, deadline=None)
 @given(scores(2), scores(3))
 def test_swapping_the_methods_changes_the_sign(a: np.ndarray, b: np.ndarray):
-    forward, backward = paired.difference(a, b, rng()), paired.difference(b, a, rng())
-    assert (forward.mean, forward.low, forward.high) == pytest.approx(
-        (-backward.mean, -backward.high, -backward.low), abs=1e-9
-    )
-    assert forward.detectable == pytest.approx(backward.detectable)
+    forward, backward = paired.difference(a, b), paired.difference(b, a)
+    assert (forward.mean, forward.low, forward.high) == (-backward.mean, -backward.high, -backward.low)
+    assert (forward.detectable, forward.p_value) == (backward.detectable, backward.p_value)
     assert forward.low - 1e-9 <= forward.high
+
+
+@settings(max_examples=25, deadline=None)
+@given(scores(2), scores(3))
+def test_the_p_value_is_below_5_percent_if_the_interval_excludes_0(a: np.ndarray, b: np.ndarray):
+    result = paired.difference(a, b)
+    assert (result.p_value < 0.05) == (result.low > 0.0 or result.high < 0.0)
+
+
+def test_holms_correction_multiplies_the_smallest_p_value_by_their_number():
+    """0.01 * 4, 0.02 * 3, 0.03 * 2, and 0.04 * 1, which is raised to the one before."""
+    assert paired.holm([0.04, 0.01, 0.03, 0.02]) == pytest.approx([0.06, 0.04, 0.06, 0.06])
+    assert paired.holm([0.9, 0.8]) == [1.0, 1.0]
+    assert paired.holm([]) == []
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8))
+def test_holms_correction_keeps_the_order_and_lowers_no_p_value(p_values: list[float]):
+    corrected = np.array(paired.holm(p_values))
+    assert (corrected >= p_values).all()
+    assert corrected.min() == min(1.0, len(p_values) * min(p_values))
+    assert (np.diff(corrected[np.argsort(p_values)]) >= 0.0).all()
 
 
 def test_flips_are_counted_and_tested_as_in_mcnemars_test():
@@ -148,8 +165,8 @@ def test_no_methods_have_no_ranks():
 
 @settings(max_examples=25, deadline=None)
 @given(scores(2), scores(3))
-def test_two_methods_share_a_rank_if_the_published_interval_holds_0(a: np.ndarray, b: np.ndarray):
-    result = paired.published_difference(a, b)
+def test_two_methods_share_a_rank_if_the_interval_holds_0(a: np.ndarray, b: np.ndarray):
+    result = paired.difference(a, b)
     assert (paired.ranks([a, b]) == [1, 1]) == (result.low <= 0.0 <= result.high)
 
 
@@ -167,16 +184,16 @@ def test_ranks_do_not_depend_on_the_order_of_methods(boards: list[np.ndarray], r
 def test_a_gap_is_beyond_noise_above_3_29_standard_errors():
     """400 settings of 0 or 20 have a standard error of 1; two independent means differ with one of 1.41, so 4.65."""
     known, fresh = around(15.0, 10.0)
-    result = paired.gap(known, fresh, rng())
+    result = paired.gap(known, fresh)
     assert result.mean == pytest.approx(5.0)
     assert (result.high - result.low) / 2 == pytest.approx(1.96 * 2**0.5, rel=0.1)
     assert result.is_beyond_noise
-    assert not paired.gap(known, fresh + 1.0, rng()).is_beyond_noise
-    assert not paired.gap(fresh, known, rng()).is_beyond_noise  # Better on fresh settings.
+    assert not paired.gap(known, fresh + 1.0).is_beyond_noise
+    assert not paired.gap(fresh, known).is_beyond_noise  # Better on fresh settings.
 
 
 def test_a_gap_may_have_other_numbers_of_settings():
-    assert paired.gap(np.full((2, 4), 20.0), np.full((2, 7), 5.0), rng()) == paired.Gap(15.0, 15.0, 15.0, True)
+    assert paired.gap(np.full((2, 4), 20.0), np.full((2, 7), 5.0)) == paired.Gap(15.0, 15.0, 15.0, True)
 
 
 def test_methods_on_settings_of_their_own_are_compared_without_pairs():

@@ -1,0 +1,81 @@
+"""`dextron-bench plan`: how many settings and seeds show a difference between two methods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from dextron_bench.cli.exit_codes import DONE
+from dextron_bench.cli.output import print_json, print_table
+from dextron_bench.reaches.sources import SourceName
+
+TOO_MANY = "more seeds are needed"
+
+
+class BadPlan(ValueError):
+    """A difference or a number of seeds that no plan can have."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Plan a comparison: how many settings and seeds show a difference of 2 % in success, four times in five.
+
+    The noise comes from results of two methods like those that will be compared; docs/statistics.md has the formula.
+
+    Example: dextron-bench plan bc rlil-0.1 --reaches real
+
+    Example: dextron-bench plan reflex runs/mine/synthetic --measure return --difference 0.5 --seeds 3 6
+    """
+
+    a: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="A")]
+    """A method with results: a label or a path, as for `compare`."""
+    b: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="B")]
+    """Another method with results on the same settings."""
+    difference: float = 2.0
+    """The difference to show: in % of success, or in return of 20 with --measure return."""
+    measure: Literal["success", "return"] = "success"
+    """What is compared."""
+    seeds: tuple[int, ...] = (3, 5, 10, 20)
+    """The numbers of seeds to plan for; a method with one seed in its results keeps one."""
+    split: str = "test"
+    """The split that both played."""
+    reaches: SourceName | None = None
+    """The source of reaches; needed only if both have results on several."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    json: bool = False
+    """Print JSON."""
+
+    def __call__(self) -> int:
+        from dextron_bench.runs import result_files
+        from dextron_bench.scores import comparison, paired, planning
+        from dextron_bench.world import task
+
+        if self.difference <= 0.0 or min(self.seeds) < 2:
+            raise BadPlan("--difference must be above 0, and --seeds at least 2: one seed does not show their spread")
+        results = result_files.find(self.a, self.runs), result_files.find(self.b, self.runs)
+        a, b = comparison.align((self.a, self.b), results, self.split, self.reaches)
+        scores = [100.0 * (one.scores == task.SUCCESS) if self.measure == "success" else one.scores for one in (a, b)]
+        noise = planning.noise(*scores)
+        plans = planning.plans(noise, self.difference, self.seeds)
+        present = paired.difference(*scores).detectable
+        if self.json:
+            print_json({"noise": asdict(noise), "present": present, "plans": [asdict(plan) for plan in plans]})
+            return DONE
+        unit = "% in success" if self.measure == "success" else "in return"
+        title = f"to show a difference of {self.difference:g} {unit} between {a.name} and {b.name}"
+        rows = [[plan.seeds, *(TOO_MANY if n is None else n for n in (plan.settings, plan.episodes))] for plan in plans]
+        print_table(f"{title}, {a.split} of {a.reaches} reaches", ["seeds", "settings", "episodes"], rows)
+        counts = f"{len(a.scores)} seed{'s' * (len(a.scores) > 1)} of {a.name} and {len(b.scores)} of {b.name}"
+        print(f"made from {counts} on {a.scores.shape[1]} settings, which show {present:.2f} {unit}")
+        print(f"standard deviation between settings {noise.settings**0.5:.2f}, between seeds {_listed(noise.seeds)}")
+        return DONE
+
+
+def _listed(variances: Sequence[float]) -> str:
+    """Standard deviations as text."""
+    return " and ".join(f"{variance**0.5:.2f}" for variance in variances) or "unknown: no method has several seeds"
