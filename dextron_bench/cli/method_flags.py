@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-COMMANDS = ("run", "eval")  # They take the settings of a method.
+COMMANDS = ("run", "eval", "sweep")  # They take the settings of a method.
 FIELD = "method_settings"  # Of these commands, for the settings. Its name is no flag, and methods have others.
 ALL, METHOD = "--all", "--method"
 
@@ -34,11 +34,12 @@ def with_method_settings(arguments: Sequence[str], command: Any) -> Any:
     if not spec:
         return command
     from dextron_bench.methods import registry
+    from dextron_bench.methods.settings import settings_class
 
-    method = registry.find_method(spec)
-    if not dataclasses.is_dataclass(method) or not dataclasses.fields(method):
-        return command
     flags = {field.name for field in dataclasses.fields(command)} - {FIELD}
+    method = settings_class(registry.find_method(spec), taken=flags)
+    if method is None:
+        return command
     if taken := [field.name for field in dataclasses.fields(method) if field.name in flags]:
         raise registry.BadSettings(
             f"method {spec!r} has a setting {taken[0]!r}, but {arguments[0]!r} already has a flag of this name"
