@@ -27,6 +27,7 @@ LEVELS = {
     "scores": 7,
     "baselines": 7,
     "leaderboard": 8,
+    "sweeps": 8,
     "cli": 9,
 }
 SDKS = {  # Packages of others that one place alone imports.
@@ -37,6 +38,7 @@ SDKS = {  # Packages of others that one place alone imports.
     "av": "dextron_bench/recording/film.py",
     "tyro": "dextron_bench/cli/",
     "rich": "dextron_bench/cli/",
+    "optuna": "dextron_bench/sweeps/optuna_search.py",
 }
 TOP = ("dextron_bench/__init__.py", "dextron_bench/__main__.py")  # Above all levels.
 PUBLIC = ("world.gym", "world.suite", "world.model", "world.task", "success.network")  # Public modules.

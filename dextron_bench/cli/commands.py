@@ -28,6 +28,7 @@ from dextron_bench.cli import (
     submit,
     success,
     success_eval,
+    sweep,
     view,
 )
 from dextron_bench.cli import eval as evaluation
@@ -45,6 +46,7 @@ Group = tuple[str, dict[str, type[Command]]]  # The description of a group of co
 COMMANDS: dict[str, type[Command] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
+    "sweep": sweep.Sweep,
     "leaderboard": (
         "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
         "add a submission to it; play fresh settings.",

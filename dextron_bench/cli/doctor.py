@@ -38,7 +38,12 @@ PACKAGES = (
     *("mujoco", "dm-control", "gymnasium", "numpy", "scipy", "torch", "safetensors"),
     *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "pillow", "tyro", "rich", "jsonschema", "threadpoolctl"),
 )
-EXTRAS = {"minari": "minari", "av": "video", "onnxruntime": "onnx"}  # By package: the extra that installs it.
+EXTRAS = {
+    "minari": "minari",
+    "av": "video",
+    "onnxruntime": "onnx",
+    "optuna": "sweep",
+}  # By package: the extra that installs it.
 RENDERERS = ("egl", "osmesa", "glfw")
 TIMEOUT = 30.0  # [s] for one renderer.
 RENDER = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 64, 64).render()"

@@ -47,7 +47,7 @@ class Eval:
     """Show no progress."""
     json: bool = False
     """Print the rows as JSON."""
-    settings: tyro.conf.Suppress[Any] = None
+    method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
         from dextron_bench.runs import execution, result_files
@@ -68,7 +68,7 @@ class Eval:
         from dextron_bench.methods import weights as method_weights
         from dextron_bench.runs.plans import Plan, resolve, with_shipped_weights
 
-        run = resolve(Plan(self.method, self.reaches, self.split, 0, self.record, settings_dict(self.settings)))
+        run = resolve(Plan(self.method, self.reaches, self.split, 0, self.record, settings_dict(self.method_settings)))
         if self.weights is None:
             return with_shipped_weights(run, self.seed)
         if len(self.seed) > 1:

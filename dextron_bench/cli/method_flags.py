@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-COMMANDS = ("run", "eval")  # They take the settings of a method.
+COMMANDS = ("run", "eval", "sweep")  # They take the settings of a method.
+FIELD = "method_settings"  # Of these commands, for the settings. Its name is no flag, and methods have others.
 ALL, METHOD = "--all", "--method"
 
 
@@ -23,7 +24,7 @@ class Length:
 
 
 def with_method_settings(arguments: Sequence[str], command: Any) -> Any:
-    """The command with a field `settings` for the method that the arguments name; unchanged if it has no settings.
+    """The command with a field for the settings of the method that the arguments name; unchanged if it has no settings.
 
     Raises UnknownMethod, BadSettings.
     """
@@ -33,11 +34,12 @@ def with_method_settings(arguments: Sequence[str], command: Any) -> Any:
     if not spec:
         return command
     from dextron_bench.methods import registry
+    from dextron_bench.methods.settings import settings_class
 
-    method = registry.find_method(spec)
-    if not dataclasses.is_dataclass(method) or not dataclasses.fields(method):
+    flags = {field.name for field in dataclasses.fields(command)} - {FIELD}
+    method = settings_class(registry.find_method(spec), taken=flags)
+    if method is None:
         return command
-    flags = {field.name for field in dataclasses.fields(command)}
     if taken := [field.name for field in dataclasses.fields(method) if field.name in flags]:
         raise registry.BadSettings(
             f"method {spec!r} has a setting {taken[0]!r}, but {arguments[0]!r} already has a flag of this name"
@@ -57,7 +59,7 @@ def as_bad_settings(arguments: Sequence[str]) -> Iterator[None]:
 
 
 def settings_dict(settings: Any) -> dict[str, Any]:
-    """The values of a command's field `settings`, by name."""
+    """The settings in a command's field, by name."""
     return {} if settings is None else {f.name: getattr(settings, f.name) for f in dataclasses.fields(settings)}
 
 
@@ -73,9 +75,9 @@ def _method_spec(arguments: Sequence[str]) -> str | None:
 
 
 def _with_settings(command: type, settings: type) -> type:
-    """A subclass of the command whose field `settings` has the flags of `settings`."""
+    """A subclass of the command whose field for settings has the flags of `settings`."""
     flat = Annotated[settings, tyro.conf.arg(name="")]
-    field = ("settings", flat, dataclasses.field(default_factory=settings))
+    field = (FIELD, flat, dataclasses.field(default_factory=settings))
     subclass = dataclasses.make_dataclass(command.__name__, [field], bases=(command,), frozen=True, kw_only=True)
     subclass.__doc__ = command.__doc__
     return subclass

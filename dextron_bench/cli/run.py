@@ -57,7 +57,7 @@ class Run:
     """Show no progress."""
     json: bool = False
     """Print the rows as JSON."""
-    settings: tyro.conf.Suppress[Any] = None
+    method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
         groups = self._groups()
@@ -68,7 +68,7 @@ class Run:
         from dextron_bench.methods import registry
         from dextron_bench.runs.plans import Plan, beside_other_code, resolve, with_tracks
 
-        settings = settings_dict(self.settings)
+        settings = settings_dict(self.method_settings)
         methods = registry.paper_methods(**settings) if self.all else [(self.method, settings)]
         plans = [Plan(spec, self.reaches, self.split, 0, self.record, flags) for spec, flags in methods]
         runs = [beside_other_code(resolve(plan), self.runs) for plan in plans]

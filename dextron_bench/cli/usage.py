@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from itertools import groupby
 from typing import Any
 
+from dextron_bench.cli.method_flags import FIELD
+
 RULE = "-"  # Separates the parts of tyro's messages.
 UNKNOWN = "Unrecognized options: "
 
@@ -37,5 +39,6 @@ def flags(command: Any) -> list[str]:
     if not dataclasses.is_dataclass(command):
         return []
     names = [field.name for field in dataclasses.fields(command)]
-    settings = next((field.default_factory for field in dataclasses.fields(command) if field.name == "settings"), None)
-    return [f"--{name.replace('_', '-')}" for name in names] + (flags(settings) if settings is not None else [])
+    settings = next((field.default_factory for field in dataclasses.fields(command) if field.name == FIELD), None)
+    own_flags = [f"--{name.replace('_', '-')}" for name in names if name != FIELD]
+    return own_flags + (flags(settings) if settings is not None else [])

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-import re
+import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import MISSING, Field, asdict, fields, is_dataclass
+from dataclasses import fields
 from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 from dextron_bench.methods import loading, specs
+from dextron_bench.methods import settings as method_settings
 from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.loading import UnknownMethod, installed_methods
-from dextron_bench.storage import hashing
+from dextron_bench.methods.settings import NAME, BadSettings, settings_of
 from dextron_bench.world import model
 
-__all__ = ["UnknownMethod", "installed_methods"]  # Imported to be used as names of this module, too.
+__all__ = [
+    "NAME",
+    "BadSettings",
+    "UnknownMethod",
+    "installed_methods",
+    "settings_of",
+]  # Imported to be used as names of this module, too.
 
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")  # A run's folder has the name of its method.
 PAPER_METHODS: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of figure 4a; `run --all` makes them.
     ("exp", {}),
     ("sim", {}),
@@ -27,7 +33,6 @@ PAPER_METHODS: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of figure 
     ("rlil", {"dur": 0.1}),
     ("rlil", {"dur": 0.3}),
 )
-LONGEST_VALUE = 24  # Characters of a setting's value in a label.
 FLOORS = "nothing", "random"  # Methods without a strategy: every other method should score higher.
 CEILINGS = ("exp",)  # Methods that receive each setting's expert: the best possible score, not an entry.
 
@@ -54,10 +59,6 @@ class SourceAware(Protocol):
 Entrant: TypeAlias = Method | Learner | PolicyTransfer
 
 
-class BadSettings(ValueError):
-    """Settings that a method does not have, or refuses."""
-
-
 def find_method(text: str) -> type[Entrant]:
     """The class of a method named by its name, `module:Class` or `file.py:Class`.
 
@@ -80,6 +81,7 @@ def create(text: str, settings: Mapping[str, Any] | None = None, reaches: str = 
         method = cls(**(settings or {}))
         if reaches and isinstance(method, SourceAware):
             method = method.for_source(reaches)
+        method_settings.remember(method, settings or {})
         run_label = label(method)
     if not isinstance(run_label, str) or not NAME.fullmatch(run_label):
         raise UnknownMethod(f"{text!r} has the label {run_label!r}: use letters, digits and . _ + -, as in 'rlil-0.1'")
@@ -96,10 +98,19 @@ def paper_methods(preset: str) -> list[tuple[str, dict[str, Any]]]:
 
 def as_flags(text: str, settings: Mapping[str, Any]) -> str:
     """The command-line flags of a method with settings; settings equal to their defaults are left out."""
-    cls = find_method(text)
-    defaults = {field.name: field.default for field in fields(cls)} if is_dataclass(cls) else {}
-    flags = [f"--{name.replace('_', '-')} {value}" for name, value in settings.items() if value != defaults.get(name)]
+    cls = method_settings.settings_class(find_method(text))
+    defaults = {field.name: method_settings.default(field) for field in fields(cls)} if cls else {}
+    flags = [as_flag(name, value) for name, value in settings.items() if value != defaults.get(name)]
     return " ".join([f"--method {text}", *flags])
+
+
+def as_flag(name: str, value: object) -> str:
+    """The words of the command line that give a setting a value."""
+    flag = name.replace("_", "-")
+    if isinstance(value, bool):
+        return f"--{flag}" if value else f"--no-{flag}"
+    values = value if isinstance(value, (tuple, list)) else [value]
+    return " ".join([f"--{flag}", *(shlex.quote(str(one)) for one in values)])
 
 
 def label(method: Entrant) -> str:
@@ -109,28 +120,7 @@ def label(method: Entrant) -> str:
     the first digits of its hash. A field with the metadata `{"in_label": False}` is left out.
     """
     named = getattr(method, "label", None)
-    return method.name + _differing_settings(method) if named is None else named
-
-
-def _differing_settings(method: Entrant) -> str:
-    """The settings that are not the defaults, as a label has them."""
-    if not is_dataclass(method):
-        return ""
-    labelled = [field for field in fields(method) if field.metadata.get("in_label", True)]
-    values = {field: getattr(method, field.name) for field in labelled}
-    return "".join(f"-{field.name}{_short(value)}" for field, value in values.items() if value != _default(field))
-
-
-def _default(field: Field[Any]) -> object:
-    return field.default if field.default_factory is MISSING else field.default_factory()
-
-
-def _short(value: object) -> str:
-    """A value as a part of a label."""
-    text = f"{value:g}" if isinstance(value, float) else str(value)
-    if len(text) <= LONGEST_VALUE and NAME.fullmatch(f"a{text}"):
-        return text
-    return hashing.digest(repr(value).encode())[:8]
+    return method.name + method_settings.in_label(method) if named is None else named
 
 
 def run_source(method: Entrant, reaches: str) -> str:
@@ -144,11 +134,6 @@ def describe(name: str) -> str:
         return (find_method(name).__doc__ or "").strip().partition("\n")[0]
     except UnknownMethod as error:
         return str(error)
-
-
-def settings_of(method: Entrant) -> dict[str, Any]:
-    """A method's settings as plain values, by name."""
-    return asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
 
 
 def run_config(method: Entrant, reaches: str, seed: int) -> dict[str, Any]:

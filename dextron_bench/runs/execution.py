@@ -25,21 +25,28 @@ from dextron_bench.splits.loading import Split, load_split
 from dextron_bench.storage import folder_config
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.training import loop
 
 Played = Iterator[tuple[int, Episode]]  # Rows and their episodes, as these end.
 
 
 def train(
-    group: Sequence[Run], runs: Path, threads: int = 0, device: str = "cpu", report: Progress = no_progress
+    group: Sequence[Run],
+    runs: Path,
+    threads: int = 0,
+    device: str = "cpu",
+    report: Progress = no_progress,
+    watch: loop.Watch = loop.no_watch,
 ) -> None:
     """Trains the learner of runs that differ only in their seeds, all seeds together; skips seeds that are trained.
 
-    `report` receives epochs. Raises the errors of `execute`, and Diverged, Busy, NoDevice.
+    `report` receives epochs, and `watch` the learning curves as they grow. Raises the errors of `execute`, what `watch`
+    raises, and Diverged, Busy, NoDevice.
     """
     for run in group:
         folder_config.check(run.folder(runs).path, run.config())
     if job := group[0].training_job(runs, threads, device):
-        job.run([run.seed for run in group], report)
+        job.run([run.seed for run in group], report, watch)
 
 
 def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progress) -> Path:

@@ -48,7 +48,7 @@ def replacing(folder: Path) -> Iterator[Path]:
     folder = folder.resolve()
     part = folder.with_name(f".{folder.name}{atomic.PART}")
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with _locked(folder), atomic.naming(folder):
+    with locked(folder.parent, folder), atomic.naming(folder):
         recover(folder)
         shutil.rmtree(part, ignore_errors=True)
         try:
@@ -105,17 +105,17 @@ def _sync_tree(folder: Path) -> None:
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Holds the lock of the folder above."""
+def locked(place: Path, changed: Path) -> Iterator[None]:
+    """Holds the lock of a folder while `changed`, at or below it, is changed; raises FolderBusy."""
     if fcntl is None:
         yield
         return
-    descriptor = os.open(folder.parent, os.O_RDONLY)
+    descriptor = os.open(place, os.O_RDONLY)
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise FolderBusy(f"another process is changing {folder}; wait for it, and run again") from None
+            raise FolderBusy(f"another process is changing {changed}; wait for it, and run again") from None
         yield
     finally:
         os.close(descriptor)

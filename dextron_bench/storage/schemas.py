@@ -168,6 +168,22 @@ CONFIG = entries({}, {"method": text, "reaches": text, "seed": COUNT, "settings"
 METHOD_CONFIG = entries({"code": CODE, "settings": OBJECT, "physics": text})
 SEARCH = entries({"search": OBJECT, "physics": text})
 RECORDINGS = map_of(text)
+ESTIMATE = entries(dict.fromkeys(("mean", "low", "high"), RETURN))
+TRIAL = entries(
+    {
+        **{"settings": OBJECT, "run": text, "state": text, "error": text},
+        "val": entries({"failed": COUNT}, {"return": ESTIMATE, "success": ESTIMATE}),
+        "points": list_of(entries({"epoch": COUNT, "return": RETURN})),
+    }
+)
+SWEEP = entries(
+    {
+        "question": entries({"method": text, "reaches": text, "settings": OBJECT, "space": OBJECT, "physics": text}),
+        "trials": list_of(TRIAL),
+        "winner": or_none(entries({"trial": COUNT, "run": text, "split": text})),
+        **dict.fromkeys(("choice", "flags"), text),
+    }
+)
 NOTES = entries({"tags": list_of(text), "note": text})
 FAILURE = entries({"error": text})
 MANIFEST = entries({"name": text, "reaches": text, "seeds": list_of(COUNT, 1)}, {"declared": DECLARED})

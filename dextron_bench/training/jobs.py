@@ -39,10 +39,11 @@ class TrainingJob:
         rest = tuple(seed for seed in missing if not any(seed in group for group in finished))
         return [*finished, rest] if rest else finished
 
-    def run(self, seeds: Sequence[int], report: Progress = no_progress) -> None:
+    def run(self, seeds: Sequence[int], report: Progress = no_progress, watch: loop.Watch = loop.no_watch) -> None:
         """Trains the seeds that need it, and writes best weights and curve into the folders of their runs.
 
-        Raises Diverged, AgentError, Busy, NoDevice, FolderMismatch, DamagedFile, UnknownSplit, MissingData.
+        `watch` receives the learning curves as they grow. Raises what it raises, Diverged, AgentError, Busy, NoDevice,
+        FolderMismatch, DamagedFile, UnknownSplit, MissingData.
         """
         for seed in seeds:
             folder_config.check(self.run_folder(seed).path, registry.run_config(self.learner, self.reaches, seed))
@@ -51,7 +52,7 @@ class TrainingJob:
             for seed in group:
                 config = registry.run_config(self.learner, self.reaches, seed)
                 folder_config.write_or_check(self.run_folder(seed).path, config)
-            checkpoints = loop.train(self.learner, track, group, self.training_folder(group), val, report)
+            checkpoints = loop.train(self.learner, track, group, self.training_folder(group), val, report, watch)
             curve = Curve(self.learner, checkpoints, track.source, val, self.threads)
             for seed in group:
                 self._publish_best(checkpoints, curve, seed)

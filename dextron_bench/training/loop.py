@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,12 @@ from dextron_bench.training.checkpoints import Checkpoints, TrainingProgress
 from dextron_bench.training.learning_curve import FINALISTS, Curve
 from dextron_bench.world import model
 
+Watch = Callable[[dict[int, list[dict[str, Any]]]], None]  # Receives the learning curve of each seed.
 NAME = re.compile(r"training-(\d+(?:\+\d+)*)", re.ASCII)  # Names of the folders in which seeds train.
+
+
+class StoppedEarly(Exception):
+    """Raised by a `watch` to end a training before its last epoch; its checkpoint stays."""
 
 
 class Diverged(ArithmeticError):
@@ -43,12 +48,23 @@ def training_folders(base: Path, below: str = "") -> dict[Path, tuple[int, ...]]
     return {folder: tuple(map(int, match[1].split("+"))) for folder, match in matches.items() if match}
 
 
+def no_watch(curves: dict[int, list[dict[str, Any]]]) -> None:
+    """A Watch that never stops a training."""
+
+
 def train(
-    learner: Learner, track: Track, seeds: Sequence[int], folder: Path, val: Split, report: Progress = no_progress
+    learner: Learner,
+    track: Track,
+    seeds: Sequence[int],
+    folder: Path,
+    val: Split,
+    report: Progress = no_progress,
+    watch: Watch = no_watch,
 ) -> Checkpoints:
     """Trains, or continues to train, until all epochs are done and the best snapshot of each seed is known.
 
-    Raises Diverged, AgentError, Busy, FolderMismatch, DamagedFile.
+    `watch` is called when the learning curves have a new point. Raises what it raises, Diverged, AgentError, Busy,
+    FolderMismatch, DamagedFile.
     """
     checkpoints = Checkpoints(folder, seeds)
     curve = Curve(learner, checkpoints, track.source, val, track.threads)
@@ -56,7 +72,7 @@ def train(
         folder_config.write_or_check(folder, config(learner, track, seeds))
         progress = checkpoints.progress()
         if not progress or not progress.over:
-            _TrainingRun(learner, track, checkpoints, curve, report).finish()
+            _TrainingRun(learner, track, checkpoints, curve, report, watch).finish()
         checkpoints.finish()
         curve.score_snapshots()
         for seed in seeds:
@@ -93,10 +109,10 @@ class _TrainingRun:
     """The epochs of a training that are not done yet."""
 
     def __init__(
-        self, learner: Learner, track: Track, checkpoints: Checkpoints, curve: Curve, report: Progress
+        self, learner: Learner, track: Track, checkpoints: Checkpoints, curve: Curve, report: Progress, watch: Watch
     ) -> None:
         self._learner, self._track, self._checkpoints, self._curve = learner, track, checkpoints, curve
-        self._report = report
+        self._report, self._watch = report, watch
 
     def finish(self) -> None:
         """Trains to the last epoch, with a checkpoint and a point of the learning curve every period."""
@@ -106,6 +122,7 @@ class _TrainingRun:
         self._curve.score_snapshots()
         note = self._last_point()
         self._report(trainer.epoch, epochs, note)
+        self._show_curves()
         while trainer.epoch < epochs:
             self._train_period(trainer, min((trainer.epoch // period + 1) * period, epochs), note)
             start = time.perf_counter()
@@ -113,6 +130,7 @@ class _TrainingRun:
             self._note_time("evaluation", trainer.epoch, time.perf_counter() - start)
             note = self._last_point()
             self._report(trainer.epoch, epochs, note)
+            self._show_curves()
 
     def _train_period(self, trainer: Trainer, last: int, note: str) -> None:
         """Trains until an epoch, the last of a period, and writes the checkpoint; `note` goes with the progress."""
@@ -151,6 +169,12 @@ class _TrainingRun:
             f"training of {self._learner.label!r} diverged: {name!r} of seed {row['seed']} is {row[name]} in epoch "
             f"{row['epoch']}; {last} in {self._checkpoints.folder}"
         )
+
+    def _show_curves(self) -> None:
+        """Gives the learning curves to `watch`, except those without points and finished ones."""
+        epochs = self._checkpoints.epochs()
+        if self._watch is not no_watch and epochs and epochs[-1] < self._learner.epochs:
+            self._watch({seed: self._curve.points(seed) for seed in self._checkpoints.seeds})
 
     def _last_point(self) -> str:
         """The last point of the learning curve in words."""

@@ -34,6 +34,8 @@ def test_a_box_becomes_one_line(box: str):
     [
         ("run --methd exp", "unknown flag --methd; did you mean --method?; see `dextron-bench run --help`"),
         ("run --method reflex --naer 1", "unknown flag --naer; did you mean --near?; see `dextron-bench run --help`"),
+        ("run --method stopping --settngs=3", "unknown flag --settngs; did you mean --settings?; see"),
+        ("run --method-settings 3", "unknown flag --method-settings; did you mean --method?; see"),
         ("run --sed=3", "unknown flag --sed; did you mean --seed?; see `dextron-bench run --help`"),
         ("rnu", "unknown word rnu; did you mean run?; see `dextron-bench --help`"),
         ("leaderboard shwo", "unknown word shwo; did you mean show?; see `dextron-bench leaderboard --help`"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from baselines.floors import Nothing, Random
 from dextron_bench.methods import loading, registry
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.registry import UnknownMethod
+from dextron_bench.methods.settings import settings_class
 from dextron_bench.storage import hashing
 
 AGENT = """
@@ -163,6 +165,39 @@ def test_settings_that_differ_from_the_defaults_are_in_the_label(
     file: Callable[[str], Path], settings: dict, label: str
 ):
     assert registry.label(registry.create(f"{file(SETTINGS)}:Mine", settings)) == label
+
+
+PLAIN = """
+class Mine:
+    name = "mine"
+    def __init__(self, near: float = 0.08, mode="fast", size: "int | None" = None, model=None, seed=0, rows=[],
+                 hot: bool = False, sizes: tuple[int, ...] = (1,)):
+        self.distance = near * 2
+
+    def agent(self, seed): ...
+"""
+
+
+def test_parameters_of_a_class_that_is_no_dataclass_are_settings(file: Callable[[str], Path]):
+    spec = f"{file(PLAIN)}:Mine"
+    flags = settings_class(registry.find_method(spec), taken={"seed"})
+    assert flags is not None
+    assert [(field.name, field.type) for field in fields(flags)] == [
+        ("near", float), ("mode", str), ("size", int | None), ("hot", bool), ("sizes", tuple[int, ...])
+    ]  # fmt: skip
+    default, near = registry.create(spec, {"near": 0.08, "mode": "fast"}), registry.create(spec, {"near": 0.06})
+    assert [registry.label(method) for method in (default, near)] == ["mine", "mine-near0.06"]
+    assert [registry.settings_of(method) for method in (default, near)] == [{}, {"near": 0.06}]
+    settings = {"near": 0.06, "mode": "fast", "hot": True, "sizes": (3, 4)}
+    assert registry.as_flags(spec, settings) == f"--method {spec} --near 0.06 --hot --sizes 3 4"
+
+
+def test_an_object_that_cannot_be_noted_has_no_settings(file: Callable[[str], Path]):
+    text = PLAIN.replace("class Mine:", "class Mine:\n    __slots__ = ()").replace("self.distance", "distance")
+    spec = f"{file(text)}:Mine"
+    assert registry.label(registry.create(spec)) == "mine"
+    with pytest.raises(registry.BadSettings, match="can have settings only as a dataclass"):
+        registry.create(spec, {"near": 0.06})
 
 
 def test_the_description_of_a_broken_installed_method_says_why(monkeypatch: pytest.MonkeyPatch):

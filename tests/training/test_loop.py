@@ -57,6 +57,26 @@ def test_a_finished_training_computes_nothing_and_changes_no_byte(tmp_path: Path
     assert tiny_training.contents(tmp_path / "a") == before
 
 
+def test_a_training_that_a_watch_stopped_continues_with_the_same_bytes(tmp_path: Path):
+    epochs: list[list[int]] = []
+
+    def watch(curves: dict[int, list[dict[str, Any]]]) -> None:
+        assert list(curves) == list(SEEDS)
+        epochs.append([point["epoch"] for point in curves[SEEDS[-1]]])
+        if len(epochs) == 2:
+            raise loop.StoppedEarly
+
+    with pytest.raises(loop.StoppedEarly):
+        train(tmp_path / "a", watch=watch)
+    progress = Checkpoints(tmp_path / "a", SEEDS).progress()
+    assert progress is not None
+    assert progress.epoch == 4
+    train(tmp_path / "a", watch=watch)
+    assert epochs == [[2], [2, 4], [2, 4]]  # The last one when it continues, and none at its end.
+    train(tmp_path / "unbroken")
+    assert tiny_training.contents(tmp_path / "a") == tiny_training.contents(tmp_path / "unbroken")
+
+
 def test_a_training_killed_before_or_after_any_write_ends_with_the_same_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

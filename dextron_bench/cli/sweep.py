@@ -1,0 +1,137 @@
+"""`dextron-bench sweep`: tries several settings of a method, and chooses the best on `val` alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import tyro
+
+from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
+from dextron_bench.cli.method_flags import settings_dict
+from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.cli.sweep_output import in_words
+from dextron_bench.reaches.sources import SourceName
+
+if TYPE_CHECKING:
+    from dextron_bench.sweeps.sweep import Sweep as Question
+    from dextron_bench.sweeps.sweep import SweepFile
+    from dextron_bench.sweeps.trial import Trial
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Try several settings of a method, each as an ordinary run, and choose the best on `val` alone.
+
+    The other settings of the method are flags, as for `run`. The same command continues a sweep that was interrupted,
+    and tries failed trials again. No test split is played; `run` plays them for the winner.
+
+    Example: dextron-bench sweep --method mine.py:Mine --grid near=0.04,0.06,0.08 --seed 0 1 2
+    """
+
+    method: str = ""
+    """The name of a method (see `dextron-bench list`), module:Class or file.py:Class."""
+    grid: tuple[str, ...] = ()
+    """Settings with values, such as near=0.04,0.06 hold=1,20: every combination is a trial."""
+    search: tuple[str, ...] = ()
+    """Settings to draw, from values or ranges, such as near=0.04..0.08 hold=1..40 rate=1e-4..1e-2:log critics=1,2."""
+    trials: int = 20
+    """How many trials --search makes; a larger number continues the same sweep."""
+    sampler: Literal["random", "tpe", "gp"] = "random"
+    """How --search draws: at random, or by Optuna's samplers, which learn from earlier trials (extra `sweep`)."""
+    sampler_seed: int = 0
+    """Seed of the draws."""
+    prune: bool = False
+    """Stop a training early when its curve on `val` is below the median of at least five trials (extra `sweep`)."""
+    seed: tuple[int, ...] = (0,)
+    """Seeds of the agent; a trial counts with the mean of all."""
+    reaches: SourceName = "synthetic"
+    """The source of reaches."""
+    name: str = ""
+    """The name of the sweep; by default the method's name and a hash of what is asked."""
+    show: bool = False
+    """Run nothing: show this sweep, the one of --name, or a list of all."""
+    runs: Path = Path("runs")
+    """Folder of all runs."""
+    threads: int = 0
+    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
+    device: Literal["cpu", "cuda", "auto"] = "cpu"
+    """The device for training; auto uses a GPU if there is one. The last bits of the weights depend on it."""
+    quiet: bool = False
+    """Show no progress."""
+    json: bool = False
+    """Print what the sweep's file holds as JSON."""
+    method_settings: tyro.conf.Suppress[Any] = None
+
+    def __call__(self) -> int:
+        from dextron_bench.sweeps import execution
+        from dextron_bench.sweeps.sweep import BadSweep, SweepFile, default_name
+
+        if self.show and not (self.grid or self.search):
+            return self._show_all() if not self.name else self._print(SweepFile.of(self.runs, self.name))
+        if not self.method:
+            raise BadSweep("give --method, or --show to see the sweeps in the folder of runs")
+        question = self._question()
+        file = SweepFile.of(self.runs, self.name or default_name(question))
+        if not self.show:
+            count = question.trials(self.trials)
+
+            def ended(number: int, trial: Trial) -> None:
+                if not (self.json or self.quiet):
+                    print(f"trial {number + 1} of {count}: {in_words(trial)}", flush=True)
+
+            resources = execution.Resources(
+                self.runs, self.threads, self.device, lambda title: progress_bar(title, self.quiet), ended
+            )
+            execution.execute(question, file, self.trials, resources)
+        return self._print(file)
+
+    def _question(self) -> Question:
+        """What the flags ask."""
+        from dextron_bench.cli import sweep_space
+        from dextron_bench.sweeps.sweep import BadSweep, Sweep
+
+        space = sweep_space.parse(self.method_settings, self.grid, self.search)
+        if self.grid and self.sampler != "random":
+            raise BadSweep("--grid tries every combination; --sampler goes with --search")
+        if self.trials < 1 or self.sampler_seed < 0:
+            raise BadSweep("--trials is 1 or more, and --sampler-seed 0 or more")
+        fixed = {name: value for name, value in settings_dict(self.method_settings).items() if name not in space}
+        seeds = tuple(dict.fromkeys(self.seed))
+        sampler = "grid" if self.grid else self.sampler
+        return Sweep(self.method, self.reaches, space, seeds, fixed, sampler, self.sampler_seed, self.prune)
+
+    def _print(self, file: SweepFile) -> int:
+        """Prints a sweep; the exit code says whether the agent raised errors."""
+        from dextron_bench.cli import sweep_output
+        from dextron_bench.sweeps.trial import FAILED, Trial
+
+        content = file.read()
+        trials = [Trial.from_json(trial) for trial in content["trials"]]
+        if self.json:
+            print_json(content)
+        else:
+            sweep_output.print_trials(file, content, trials, self.runs)
+            sweep_output.print_winner(content, trials, self.runs)
+        return EPISODES_FAILED if any(trial.failed or trial.state == FAILED for trial in trials) else DONE
+
+    def _show_all(self) -> int:
+        """Prints a row for each sweep."""
+        from dextron_bench.sweeps.sweep import sweep_files
+        from dextron_bench.sweeps.trial import ENDED
+
+        rows = []
+        for file in sweep_files(self.runs):
+            content = file.read()
+            winner = content["winner"]
+            score = content["trials"][winner["trial"]]["val"]["return"]["mean"] if winner else None
+            ended = sum(trial["state"] in ENDED for trial in content["trials"])
+            rows.append([file.name, content["question"]["method"], ended, winner["run"] if winner else "", score])
+        if self.json:
+            names = ("sweep", "method", "ended", "winner", "return")
+            print_json([dict(zip(names, row, strict=True)) for row in rows])
+        else:
+            cells = [[*row[:4], "" if row[4] is None else f"{row[4]:.2f}"] for row in rows]
+            print_table(f"sweeps in {self.runs}", ["sweep", "method", "trials ended", "winner", "return on val"], cells)
+        return DONE

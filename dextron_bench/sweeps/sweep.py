@@ -1,0 +1,132 @@
+"""A sweep: what is asked, and the file that holds it with the trials and the winner."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dextron_bench.methods import registry
+from dextron_bench.runs.plans import Plan, resolve
+from dextron_bench.splits.loading import load_split
+from dextron_bench.storage import atomic, folder_config, hashing, schemas
+from dextron_bench.storage.folders import visible
+from dextron_bench.sweeps import optuna_search, space
+from dextron_bench.sweeps.space import Choices, Space
+from dextron_bench.sweeps.trial import Trial, best
+
+FOLDER, FILE = "sweeps", "sweep.json"  # In the folder of runs: sweeps/<name>/sweep.json.
+VAL = "val"
+CHOICE = "The winner has the highest mean return on val. The sweep has played no other split."
+
+
+class BadSweep(ValueError):
+    """A sweep that does not exist, that has another question, or whose name no folder can have."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What a sweep asks: a method with fixed `settings`, and a space of others; one agent for each of `seeds`.
+
+    The sampler "grid" tries every combination of values; "random", "tpe" and "gp" draw trials. Draws depend on
+    `sampler_seed`. With `prune`, a training is stopped when its learning curve falls below the median.
+    """
+
+    method: str
+    reaches: str
+    space: Space
+    seeds: tuple[int, ...] = (0,)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    sampler: str = "grid"
+    sampler_seed: int = 0
+    prune: bool = False
+
+    def plan(self, settings: Mapping[str, Any]) -> Plan:
+        """The run of a trial, on `val` alone."""
+        return Plan(self.method, self.reaches, (VAL,), settings={**self.settings, **settings})
+
+    def question(self) -> dict[str, Any]:
+        """Everything that the results depend on, as plain values; raises the errors of `resolve`, UnknownSplit."""
+        run = resolve(self.plan({}))
+        about = {name: value for name, value in run.config().items() if name != "seed"}
+        about["settings"] = {name: value for name, value in about["settings"].items() if name not in self.space}
+        about |= {"space": space.as_json(self.space), "seeds": list(self.seeds), "prune": self.prune}
+        about |= {"sampler": self.sampler, "val": load_split(run.source, VAL).digest}
+        about |= {} if self.sampler == "grid" else {"sampler_seed": self.sampler_seed}
+        return json.loads(json.dumps(about))
+
+    def trials(self, most: int) -> int:
+        """The number of trials: all combinations of a grid, or `most`."""
+        return len(self._grid()) if self.sampler == "grid" else most
+
+    def propose(self, earlier: list[Trial]) -> dict[str, Any]:
+        """The settings of the next trial; depends on nothing but the question and the earlier trials."""
+        number = len(earlier)
+        if self.sampler == "grid":
+            return self._grid()[number]
+        seed = [self.sampler_seed, number]
+        if self.sampler == "random":
+            return space.draw(self.space, np.random.default_rng(seed))
+        return optuna_search.propose(self.space, self.sampler, seed, earlier)
+
+    def _grid(self) -> list[dict[str, Any]]:
+        return space.grid({name: part for name, part in self.space.items() if isinstance(part, Choices)})
+
+
+def default_name(sweep: Sweep) -> str:
+    """The name of a sweep that the user does not name: its method, and the first digits of its question's hash."""
+    question = sweep.question()
+    return f"{question['method']}-{hashing.digest(json.dumps(question, sort_keys=True).encode())[:8]}"
+
+
+@dataclass(frozen=True)
+class SweepFile:
+    """The file of a sweep."""
+
+    path: Path
+
+    @classmethod
+    def of(cls, runs: Path, name: str) -> SweepFile:
+        """The file of a sweep by its name; raises BadSweep."""
+        if not registry.NAME.fullmatch(name):
+            raise BadSweep(f"{name!r} is no name of a sweep: use letters, digits and . _ + -, as in 'near-and-hold'")
+        return cls(runs / FOLDER / name / FILE)
+
+    @property
+    def name(self) -> str:
+        """The name of the sweep."""
+        return self.path.parent.name
+
+    def read(self) -> dict[str, Any]:
+        """Its content; raises BadSweep if there is none, DamagedFile."""
+        if not self.path.exists():
+            names = ", ".join(file.name for file in sweep_files(self.path.parents[2])) or "none"
+            raise BadSweep(f"no sweep is called {self.name!r}; the folder has {names}")
+        return schemas.read(self.path, schemas.SWEEP)
+
+    def begin(self, question: Mapping[str, Any]) -> list[Trial]:
+        """The trials so far, none for a new sweep; raises BadSweep if the file has another question."""
+        if not self.path.exists():
+            return []
+        content = self.read()
+        if names := list(folder_config.differences(content["question"], question)):
+            raise BadSweep(
+                f"{self.path.parent} holds another sweep: it differs in {' and '.join(names)}; give another --name"
+            )
+        return [Trial.from_json(trial) for trial in content["trials"]]
+
+    def write(self, question: Mapping[str, Any], trials: list[Trial], flags: str) -> None:
+        """Replaces the content; `flags` of `run` are the method and the settings that do not vary."""
+        number = best(trials)
+        winner = None if number is None else {"trial": number, "run": trials[number].run, "split": VAL}
+        content = {"question": dict(question), "trials": [trial.as_json() for trial in trials], "flags": flags}
+        atomic.write_json(self.path, content | {"winner": winner, "choice": CHOICE})
+
+
+def sweep_files(runs: Path) -> Iterator[SweepFile]:
+    """The files of all sweeps below a folder of runs, sorted."""
+    return (SweepFile(file) for file in visible(runs, f"{FOLDER}/*/{FILE}"))
