@@ -35,6 +35,8 @@ class Reflex:
 class ReflexAgent:
     """Opens until the palm's centre comes within `near` [m] of the bottle's axis, then closes, and never reopens."""
 
+    rows_are_independent = True
+
     def __init__(self, near: float) -> None:
         self._near, self._closes = near, np.zeros(0, bool)
 

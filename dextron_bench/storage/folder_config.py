@@ -48,11 +48,11 @@ def _check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> 
     if not file.exists():
         return
     stored, expected = schemas.read(file, schemas.OBJECT), json.loads(json.dumps(config))
-    if names := list(_differences(stored, expected)):
+    if names := list(differences(stored, expected)):
         raise FolderMismatch(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")
 
 
-def _differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:
+def differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:
     """Names of the entries of `expected` with another stored value; inner names of a mapping in brackets."""
     for name, value in expected.items():
         stored_value = stored.get(name)
