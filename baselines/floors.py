@@ -11,6 +11,8 @@ import numpy as np
 class _ZeroAgent:
     """Always sends 0."""
 
+    rows_are_independent = True
+
     def reset(self, episodes: np.ndarray) -> None:
         """Does nothing: the agent has no memory."""
 

@@ -78,6 +78,8 @@ class Omega:
 class OmegaAgent:
     """Acts by a success model; remembers the last action of each episode."""
 
+    rows_are_independent = True
+
     def __init__(self, model: SuccessModel, tolerance: float, near: float) -> None:
         """Takes the model, and the settings `tolerance` and `near` of `Omega`."""
         self._model, self._tolerance, self._near = model, tolerance, near

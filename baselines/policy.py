@@ -41,6 +41,8 @@ def log_probability(raw: Tensor, log_std: Tensor, noise: Tensor) -> Tensor:
 class MeanAgent:
     """Plays tanh(mean), the deterministic policy of one seed's weights; the actions do not depend on the batch size."""
 
+    rows_are_independent = True
+
     def __init__(self, weights: Mapping[str, np.ndarray]) -> None:
         """Takes `mean` and `deviation` (48,) of states, and the policy's layers as `policy.0`, `policy.1`, ..."""
         self._mean, self._deviation = (np.asarray(weights[name], np.float64) for name in ("mean", "deviation"))

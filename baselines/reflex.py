@@ -19,6 +19,7 @@ class Reflex:
     """Closes at full speed within a distance, the same for every reach, and opens at full speed beyond it."""
 
     name: ClassVar[str] = "reflex"
+    rows_are_independent: ClassVar[bool] = True
 
     near: float = 0.06
     """Distance from the palm's centre to the bottle [m]; 0.06 is the best of 0.05, 0.06 and 0.08 on `val` of `real`."""

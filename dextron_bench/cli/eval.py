@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from dextron_bench.cli import shares
 from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.leaderboard import print_rows
 from dextron_bench.cli.method_flags import settings_dict
@@ -43,6 +44,10 @@ class Eval:
     """Folder of all runs."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
+    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
+    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
+    merge: bool = False
+    """Only put together what shares have done; if anything is missing, this is an error that names it."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
@@ -53,12 +58,17 @@ class Eval:
         from dextron_bench.runs import execution, result_files
         from dextron_bench.scores import standings
 
-        runs = self._runs()
+        share, runs, folder = shares.parse(self.share, self.merge), self._runs(), self.runs / "eval"
+        if share is not None or self.merge:
+            jobs = [execution.prepare(run, folder, self.threads) for run in runs]
+            if share is not None:
+                return shares.play_jobs(jobs, share, folder, self.quiet)
+            shares.check_jobs(jobs)
         results = []
         for run in runs:
             with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:
-                execution.execute(run, self.runs / "eval", self.threads, progress)
-            results.append(result_files.read_result(run.folder(self.runs / "eval").result))
+                execution.execute(run, folder, self.threads, progress)
+            results.append(result_files.read_result(run.folder(folder).result))
         rows = standings.table(results)
         print_rows(rows[rows["split"].isin(runs[0].splits)], self.json)
         return EPISODES_FAILED if rows["failed"].any() else DONE

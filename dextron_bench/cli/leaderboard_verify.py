@@ -7,10 +7,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from dextron_bench.cli import shares
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
@@ -18,8 +19,6 @@ from dextron_bench.storage.printable import printable, printable_line
 
 if TYPE_CHECKING:
     from dextron_bench.leaderboard.submission.verdict import Verdict
-
-SHOWN = 5  # How many problems of a row are printed.
 
 
 @dataclass(frozen=True)
@@ -56,46 +55,36 @@ class Verify:
     """With --rerun: how many fresh settings of each split its agent plays; 0 means as many as the split has."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard."""
+    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
+    """With --all: do only a part of the work; 0/2 and 1/2 are its halves (docs/many-machines.md)."""
+    merge: bool = False
+    """With --all: only put together what shares have done; if anything is missing, this is an error that names it."""
+    runs: Path = Path("runs")
+    """Folder of all runs; the findings of shares are in its folder `verify`."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
     quiet: bool = False
     """Show no progress."""
 
     def __call__(self) -> int:
+        from dextron_bench.cli import board_verification
         from dextron_bench.leaderboard import verify_board
 
+        share = shares.parse(self.share, self.merge)
         if self.all and self.bundle is not None:
             raise verify_board.NothingToVerify(
                 f"--all verifies the leaderboard's own rows: leave out {self.bundle}, or leave out --all"
             )
         if not self.all and self.bundle is None:
             raise verify_board.NothingToVerify("give a submission, or --all for the leaderboard's own rows")
+        if self.bundle is not None and (share is not None or self.merge):
+            raise shares.BadShare("--share and --merge need --all: the verification of a submission is one piece")
+        if share is not None:
+            return board_verification.verify_share(self, share)
         if self.bundle is None:
-            return self._verify_board()
+            return board_verification.verify_board(self)
         with unpacked(self.bundle) as opened:
             return print_verdict(_verify(opened, self))
-
-    def _verify_board(self) -> int:
-        from dextron_bench.leaderboard import build, verify_board
-
-        sound = True
-        for row in verify_board.rows(self.board, self.method, self.reaches):
-            with progress_bar(row.name, self.quiet) as progress:
-                finding = verify_board.check(row, self.board, self.rows, self.redraw, self.threads, progress)
-            done = finding.done if not finding.problems else "DIFFERS from its episodes"
-            print(printable_line(f"{row.name}: {done}"), flush=True)
-            for problem in finding.problems[:SHOWN]:
-                print(f"  {printable_line(problem)}")
-            sound &= not finding.problems
-            if self.stamp and verify_board.stamp(row, finding):
-                print("  its tier is now `re-run`")
-        if self.stamp:
-            build.build(self.board)
-        if problems := verify_board.differing_files(self.board):
-            print("tables and page: DIFFER from the results", *problems, sep="\n  ")
-        else:
-            print("tables and page: equal to those computed again from the results")
-        return DONE if sound and not problems else DIFFERS
 
 
 @dataclass(frozen=True)

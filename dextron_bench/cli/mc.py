@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import tyro
+
+from dextron_bench.cli import shares
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
@@ -26,8 +29,10 @@ class MonteCarlo:
     """Search until this many rows have the full return of 20."""
     seed: int = 0
     """Seed of all draws."""
-    share: str = "0/1"
-    """The part of the search that this process does: 0/2 and 1/2 split it between two processes in one folder."""
+    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
+    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
+    merge: bool = False
+    """Only put together what shares have done; if anything is missing, this is an error that names it."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor."""
     extend: bool = False
@@ -44,6 +49,7 @@ class MonteCarlo:
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.world.engine import Engine
 
+        share = shares.parse(self.share, self.merge)
         search = montecarlo.Search(self.reaches, self.seed)
         folder = self.runs / "mc" / self.reaches / f"seed{self.seed}"
         source = open_source(self.reaches)
@@ -52,11 +58,14 @@ class MonteCarlo:
             rows, summary = database.load_shipped(self.reaches)
             database.check_physics(summary)
             montecarlo.restore(source, search, folder, rows, summary["settings"] // search.block)
+        if share is not None:
+            with progress_bar(f"blocks of share {share}", self.quiet) as progress:
+                count = montecarlo.run_share(source, search, folder, self.rows, engine, share, progress)
+            return shares.print_done(share, f"{count} blocks", folder)
+        if self.merge:
+            montecarlo.check_complete(search, folder, self.rows)
         with progress_bar("rows of return 20", self.quiet) as progress:
-            draws = montecarlo.run(
-                source, search, folder, self.rows, engine,
-                progress, montecarlo.Share.parse(self.share),
-            )  # fmt: skip
+            draws = montecarlo.run(source, search, folder, self.rows, engine, progress)
         file, summary = database.save(draws, source, search, folder, f"experts-{self.reaches}")
         print_json(summary) if self.json else self._print(summary, file)
         return DONE

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from dextron_bench.cli import shares
 from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.leaderboard import print_rows
 from dextron_bench.cli.method_flags import settings_dict
@@ -16,6 +17,7 @@ from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
+    from dextron_bench.runs.evaluation_job import EvaluationJob
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,10 @@ class Run:
     """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
     device: Literal["cpu", "cuda", "auto"] = "cpu"
     """The device for training; auto uses a GPU if there is one. The last bits of the weights depend on it."""
+    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
+    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
+    merge: bool = False
+    """Only put together what shares have done; if anything is missing, this is an error that names it."""
     dry_run: bool = False
     """Only print what is left to do and an estimate of the time."""
     quiet: bool = False
@@ -60,8 +66,23 @@ class Run:
     method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
-        groups = self._groups()
-        return self._estimate(groups) if self.dry_run else self._execute(groups)
+        share, groups = shares.parse(self.share, self.merge), self._groups()
+        if self.dry_run:
+            return self._estimate(groups)
+        if share is not None:
+            return self._play(share, groups)
+        if self.merge:
+            shares.check_jobs(self._jobs(groups))
+        return self._execute(groups)
+
+    def _jobs(self, groups: list[list[plans.Run]]) -> list[EvaluationJob]:
+        from dextron_bench.runs import execution
+
+        return [execution.prepare(run, self.runs, self.threads) for group in groups for run in group]
+
+    def _play(self, share: shares.Share, groups: list[list[plans.Run]]) -> int:
+        """Plays the pieces of a share."""
+        return shares.play_jobs(self._jobs(groups), share, self.runs, self.quiet)
 
     def _groups(self) -> list[list[plans.Run]]:
         """The runs of each method, one for each seed."""

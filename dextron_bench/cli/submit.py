@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from dextron_bench.cli import shares
 from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.leaderboard import print_rows
 from dextron_bench.cli.output import progress_bar
@@ -58,6 +59,10 @@ class Submit:
     """Folder of the leaderboard; the printed table has its methods too."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
+    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
+    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
+    merge: bool = False
+    """Only put together what shares have done; if anything is missing, this is an error that names it."""
     quiet: bool = False
     """Show no progress."""
     settings: str = "{}"
@@ -70,6 +75,12 @@ class Submit:
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
+        share = shares.parse(self.share, self.merge)
+        if share is not None or self.merge:
+            jobs = playing.prepare_all(entry, self.runs, self.record, limits, self.threads)
+            if share is not None:
+                return shares.play_jobs(jobs, share, self.runs, self.quiet)
+            shares.check_jobs(jobs)
         with progress_bar(entry.name, self.quiet) as progress:
             folder = playing.play_entry(entry, self.runs, self.record, limits, self.threads, progress)
         playing.write_bundle(entry, folder, file)

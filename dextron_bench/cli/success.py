@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from dextron_bench.cli import shares
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 from dextron_bench.reaches.sources import RankedSource
@@ -34,6 +35,10 @@ class Data:
     """Threads of the simulation; 0 means one per processor."""
     runs: Path = Path("runs")
     """Folder of all runs; also holds the data set."""
+    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
+    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
+    merge: bool = False
+    """Only put together what shares have done; if anything is missing, this is an error that names it."""
     quiet: bool = False
     """Show no progress."""
     json: bool = False
@@ -44,12 +49,21 @@ class Data:
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.splits.loading import load_split
         from dextron_bench.storage import hashing
-        from dextron_bench.success import generation
+        from dextron_bench.success import generation, sharing
 
+        share = shares.parse(self.share, self.merge)
         agents = {hashing.sha256(file): weights.load_agent_from_file(file) for file in self.policies}
         config = generation.DatasetConfig(self.reaches, self.seed, tuple(agents))
         source, train = open_source(self.reaches), load_split(self.reaches, "train").cases
         folder = folder_of(self.runs, self.reaches, self.seed)
+        if share is not None:
+            with progress_bar(f"blocks of share {share}", self.quiet) as progress:
+                count = sharing.generate_share(
+                    source, train, config, folder, self.rows, agents, share, self.threads, progress
+                )
+            return shares.print_done(share, f"{count} blocks", folder)
+        if self.merge:
+            sharing.check_complete(folder, config, self.rows)
         with progress_bar("transitions", self.quiet) as progress:
             tallies = generation.generate(source, train, config, folder, self.rows, agents, self.threads, progress)
         rows = [{"kind": kind, **tally.as_dict()} for kind, tally in tallies.items() if tally.rows]

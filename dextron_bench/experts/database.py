@@ -43,7 +43,7 @@ def save(
         "kept": len(kept),
         "solved": int((kept["score"] == task.SUCCESS).sum()),
         "statistics": statistics(draws, source).to_dict("records"),
-        "provenance": provenance.collect(model.mjcf_hash()),
+        "provenance": blocks.read_makers(folder),
     }
     atomic.write_json(file.with_suffix(".json"), about)
     return file, about

@@ -7,6 +7,8 @@ continue, on any number of threads, and finds the same rows.
 from __future__ import annotations
 
 import itertools
+import math
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Protocol
@@ -16,8 +18,10 @@ import pandas as pd
 
 from dextron_bench.experts import blocks, outcomes, policies
 from dextron_bench.reaches import setting
-from dextron_bench.storage import folder_config
+from dextron_bench.storage import folder_config, provenance, shares
 from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.shares import MissingPieces, Share, blocks_needed
+from dextron_bench.world import model
 from dextron_bench.world.engine import Engine
 
 SLOTS = 1024  # Episodes at once, with the slots that are reserved for forks.
@@ -64,26 +68,6 @@ def draw(source: Sampler, search: Search, block: int) -> pd.DataFrame:
     return draws
 
 
-@dataclass(frozen=True, slots=True)
-class Share:
-    """The blocks that one of several processes searches: `index`, `index` + `of`, `index` + 2 `of`, ..."""
-
-    index: int = 0
-    of: int = 1
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.index < self.of:
-            raise BadSearch(f"share {self.index}/{self.of} does not exist; shares count from 0")
-
-    @classmethod
-    def parse(cls, text: str) -> Share:
-        """The share that a text like 0/2 names; raises BadSearch."""
-        index, _, of = text.partition("/")
-        if not (index.isdecimal() and of.isdecimal()):
-            raise BadSearch(f"share {text!r} is not like 0/2, the first of two")
-        return cls(int(index), int(of))
-
-
 def run(
     source: setting.Source,
     search: Search,
@@ -91,27 +75,80 @@ def run(
     rows: int,
     engine: Engine,
     progress: Progress = no_progress,
-    share: Share | None = None,
 ) -> pd.DataFrame:
     """Searches, or continues, until `rows` rows have all 20 rewards; returns every draw with its outcome, in order.
 
-    Columns: the columns of `draw`, then `score` (sum of rewards) and `length` [control steps]. Processes with different
-    shares may work in one folder. Calls `progress` with the number of rows with all rewards, and `rows`. Raises
-    FolderMismatch if the folder holds another search, DamagedBlock.
+    Columns: the columns of `draw`, then `score` (sum of rewards) and `length` [control steps]. Blocks of shares are
+    checked, and become blocks of the search. Calls `progress` with the number of rows with all rewards, and `rows`.
+    Raises FolderMismatch if the folder holds another search, DamagedBlock, and the errors of `shares.Work.read`.
     """
     blocks.write_or_check(asdict(search), folder)
+    blocks.take_pieces(asdict(search), folder)
     done = blocks.update_tallies(folder, {})
-    stored = frozenset(done)
     progress(blocks.total(done).solved, rows)
-    share = share or Share()
-    missing = (number for number in itertools.count(share.index, share.of) if number not in stored)
-    drawn = ((number, draw(source, search, number)) for number in missing)
-    new_blocks = outcomes.play_blocks(source, engine, drawn, search.experts)
+    if blocks.last_block_needed(done, rows) is None and (folder / blocks.PROVENANCE).exists():
+        blocks.add_makers(folder, [provenance.collect(model.mjcf_hash())])
+    new_blocks = _played(source, search, engine, itertools.count(), frozenset(done))
     while (last := blocks.last_block_needed(done, rows)) is None:
         blocks.write(folder, *next(new_blocks))
         done = blocks.update_tallies(folder, done)
         progress(blocks.total(done).solved, rows)
     return pd.concat([_stored(source, search, folder, number) for number in range(last + 1)], ignore_index=True)
+
+
+def run_share(
+    source: setting.Source,
+    search: Search,
+    folder: Path,
+    rows: int,
+    engine: Engine,
+    share: Share,
+    progress: Progress = no_progress,
+) -> int:
+    """Searches the blocks of a share until, as far as the folder shows, all shares together have `rows` solved rows.
+
+    Returns the number of this share's blocks. A share that sees only its own blocks stops at about its part of `rows`
+    (see `shares.blocks_needed`). Calls `progress` with numbers of this share's blocks. Raises the errors of `run`.
+    """
+    blocks.write_or_check(asdict(search), folder)
+    blocks.read_pieces(asdict(search), folder)  # Checks them.
+    done = blocks.update_tallies(folder, {}, pieces=True)
+    new_blocks = _played(source, search, engine, itertools.count(share.index, share.of), frozenset(done))
+    while not _is_enough(done, rows, share, progress):
+        blocks.write_piece(asdict(search), folder, *next(new_blocks))
+        done = blocks.update_tallies(folder, done, pieces=True)
+    return sum(share.has(number) for number in done)
+
+
+def check_complete(search: Search, folder: Path, rows: int) -> None:
+    """Raises MissingPieces if blocks are missing for `rows` solved rows, and the errors of `shares.Work.read`."""
+    blocks.read_pieces(asdict(search), folder)
+    done = blocks.update_tallies(folder, {}, pieces=True)
+    if blocks.last_block_needed(done, rows) is None:
+        count = max(done, default=-1) + 1
+        names = [f"block {number:06d}" for number in range(count)]
+        shares.check_complete(f"the search in {folder}", names, {f"block {number:06d}" for number in done})
+        raise MissingPieces(
+            f"the search in {folder} lacks the blocks from {count:06d} on: the blocks before have "
+            f"{blocks.total(done).solved} of {rows} rows; run the shares again, or leave out --merge"
+        )
+
+
+def _is_enough(done: dict[int, blocks.Tally], rows: int, share: Share, progress: Progress) -> bool:
+    """True if a share has nothing left to search; reports its progress."""
+    needed = blocks_needed([tally.solved for tally in done.values()], rows)
+    following = next(number for number in itertools.count(share.index, share.of) if number not in done)
+    mine = sum(share.has(number) for number in done)
+    progress(mine, 0 if needed == math.inf else max(mine, math.ceil((needed - share.index) / share.of)))
+    return blocks.last_block_needed(done, rows) is not None or following >= needed
+
+
+def _played(
+    source: setting.Source, search: Search, engine: Engine, numbers: Iterable[int], stored: Collection[int]
+) -> Iterator[tuple[int, pd.DataFrame]]:
+    """Plays the blocks with these numbers that are not stored; yields each number and its draws with outcomes."""
+    drawn = ((number, draw(source, search, number)) for number in numbers if number not in stored)
+    return outcomes.play_blocks(source, engine, drawn, search.experts)
 
 
 def _stored(source: setting.Source, search: Search, folder: Path, number: int) -> pd.DataFrame:

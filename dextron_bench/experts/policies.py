@@ -53,6 +53,8 @@ class ExpertAgent:
     The first action of an episode is 0. Later distances are divided by the distance at that first step.
     """
 
+    rows_are_independent = True
+
     def __init__(self) -> None:
         self._gain, self._critical, self._first = np.zeros((3, 0))
 

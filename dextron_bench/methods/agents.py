@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 class Agent(Protocol):
-    """Acts in N episodes at once; it may keep memory for each episode."""
+    """Acts in N episodes at once; it may keep memory for each episode.
+
+    An agent whose attribute `rows_are_independent` is True promises that its actions in an episode follow from the
+    states of that episode alone, so that the rows of a split can be played in pieces, with the same bits.
+    """
 
     def reset(self, episodes: np.ndarray) -> None:
         """Announces that rows `episodes` (n,) of the next states begin a new episode; called before that `act`."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
+from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 from dextron_bench.methods import loading, specs
@@ -14,6 +16,7 @@ from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.loading import UnknownMethod, installed_methods
 from dextron_bench.methods.settings import NAME, BadSettings, settings_of
+from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
 __all__ = [
@@ -146,6 +149,18 @@ def run_config(method: Entrant, reaches: str, seed: int) -> dict[str, Any]:
         "seed": seed,
         "physics": model.mjcf_hash(),
     }
+
+
+def package_files(cls: type) -> list[Path]:
+    """The files of the package that a class lies in; if it lies in a file or in a module without package, that file.
+
+    Code that a method loads from elsewhere is not among them.
+    """
+    module = sys.modules[cls.__module__]
+    if not module.__file__:
+        return []
+    file = Path(module.__file__)
+    return visible(file.parent, "*.py") if module.__package__ else [file]
 
 
 @contextmanager

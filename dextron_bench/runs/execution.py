@@ -1,33 +1,27 @@
-"""Executes runs: trains the learner if there is one, evaluates on splits, records episodes, writes the result.
-
-`evaluate` has more than 25 lines because of its seven parameters.
-"""
+"""Executes runs: trains the learner if there is one, evaluates on splits, records episodes, writes the result."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
-from dextron_bench.evaluation import episode_table
-from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.methods import weights
+from dextron_bench.methods import registry, weights
 from dextron_bench.methods.agents import Agent, Privileged, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.reaches import sources
-from dextron_bench.reaches.setting import Source
-from dextron_bench.runs import recording_files, result_files, run_files
+from dextron_bench.runs import result_files, run_files
+from dextron_bench.runs.evaluation_job import EvaluationJob, Played
 from dextron_bench.runs.plans import Run, no_weights
 from dextron_bench.splits.loading import Split, load_split
-from dextron_bench.storage import folder_config
+from dextron_bench.storage import folder_config, hashing, provenance
 from dextron_bench.storage.progress import Progress, no_progress
-from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.training import loop
 
-Played = Iterator[tuple[int, Episode]]  # Rows and their episodes, as these end.
+
+class NotTrained(LookupError):
+    """A run whose weights are missing where nothing may be trained."""
 
 
 def train(
@@ -53,25 +47,57 @@ def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progre
     """Trains and evaluates what the run's folder does not hold yet; returns the folder, with its `result.json`.
 
     `report` receives the episodes of each split. Raises FolderMismatch, DamagedFile, UnknownSplit, MissingData,
-    AgentError, MissingWeights.
+    AgentError, MissingWeights, and the errors of `shares.Work.read`.
     """
-    folder = run.folder(runs)
+    training = run.training_job(runs)
+    if training:  # Splits or data that are missing end the command before the training.
+        sources.open_source(run.source)
+        for name in run.splits:
+            load_split(run.source, name)
+        train([run], runs, threads)
+    job = prepare(run, runs, threads)
+    table = job.table(report)
+    result_files.write_result(job.folder, table, job.facts, training.seconds(run.seed) if training else None)
+    return job.folder.path
+
+
+def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
+    """The evaluation of a run whose training is done; writes the config of its folder.
+
+    Raises NotTrained, FolderMismatch, DamagedFile, UnknownSplit, MissingData, AgentError, MissingWeights.
+    """
     splits = [load_split(run.source, name) for name in run.splits]
-    source = sources.open_source(run.source)
-    train([run], runs, threads)
+    source, folder = sources.open_source(run.source), run.folder(runs)
     weights_file = _weights_file(run, runs)
-    privileged = isinstance(agent(run, weights_file), Privileged)  # If this raises, there is no folder yet.
+    if weights_file and not weights_file.exists():
+        raise NotTrained(
+            f"{run.label} is not trained for seed {run.seed}: {weights_file} is missing, and a share or a merge trains "
+            "nothing; train it first with `--split val` and without --share, and copy the folder of runs"
+        )
+    player = agent(run, weights_file)  # If this raises, there is no folder yet.
     folder_config.write_or_check(folder.path, run.config())
     copy = run_files.copy_weights(weights_file, folder) if weights_file else None
 
-    def play(split: Split) -> Played:
-        return rollout(agent(run, copy), source, split.cases, threads=threads, track=split.track, bottles=split.bottles)
+    def play(split: Split, rows: range) -> Played:
+        cases, bottles = split.cases[rows.start : rows.stop], split.bottles_of(rows)
+        episodes = rollout(agent(run, copy), source, cases, threads=threads, track=split.track, bottles=bottles)
+        for place, episode in episodes:
+            yield rows.start + place, episode
 
-    episodes = evaluate(folder, source, splits, play, run.plan.record, run.about, report)
-    about = run.about | _training_facts(run, copy) | ({"privileged": "each setting's expert"} if privileged else {})
-    job = run.training_job(runs)
-    result_files.write_result(folder, episodes, about, job.seconds(run.seed) if job else None)
-    return folder.path
+    facts = run.about | _training_facts(run, copy)
+    facts |= {"privileged": "each setting's expert"} if isinstance(player, Privileged) else {}
+    return EvaluationJob(
+        folder,
+        source,
+        splits,
+        play,
+        run.plan.record,
+        run.about,
+        facts,
+        run.config() | {"weights": hashing.sha256(copy) if copy else None},
+        provenance.code_hash(*registry.package_files(type(run.method))),
+        getattr(player, "rows_are_independent", False) is True,
+    )
 
 
 def agent(run: Run, file: Path | None) -> Agent:
@@ -82,42 +108,6 @@ def agent(run: Run, file: Path | None) -> Agent:
     assert not isinstance(run.method, Learner | PolicyTransfer)
     with as_agent_error(f"agent({run.seed}) of method {run.method.name!r}"):
         return run.method.agent(run.seed)
-
-
-def evaluate(
-    folder: RunFolder,
-    source: Source,
-    splits: Sequence[Split],
-    play: Callable[[Split], Played],
-    record: int,
-    about: dict[str, Any],
-    report: Progress = no_progress,
-) -> pd.DataFrame:
-    """The table of episodes of a run; plays the splits that the folder lacks and stores the table after each.
-
-    `play` plays a split and yields (row, episode) as episodes end. The first `record` rows are recorded, with `about`
-    among their properties.
-    """
-    table = run_files.stored_episodes(folder, splits)
-    for split in splits:
-        stored = table[table["split"] == split.name] if len(table) else table
-        if len(stored) == len(split.cases) and not recording_files.any_missing(folder, stored, record):
-            continue
-        rows: dict[int, dict[str, Any]] = {}
-        for row, episode in play(split):
-            rows[row] = episode_table.row(split, row, episode)
-            if row < record and len(episode.actions):
-                recording_files.record(folder, source, split, row, episode, about)
-            report(len(rows), len(split.cases))
-        table = _with_split(table, split.name, [rows[row] for row in sorted(rows)])
-        run_files.store_episodes(folder, table)
-    return table
-
-
-def _with_split(table: pd.DataFrame, split: str, rows: list[dict[str, Any]]) -> pd.DataFrame:
-    """The table with other rows of a split, at its end."""
-    others = [table[table["split"] != split]] if len(table) else []
-    return pd.concat([*others, pd.DataFrame(rows)], ignore_index=True)
 
 
 def _weights_file(run: Run, runs: Path) -> Path | None:

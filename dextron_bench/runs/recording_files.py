@@ -29,7 +29,13 @@ def any_missing(folder: RunFolder, table: pd.DataFrame, record: int) -> bool:
 
 
 def record(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> None:
-    """Writes the recording of an episode, with what the shipped success model predicts, and its hash in the manifest.
+    """Writes the recording of an episode as `write` does, and its hash in the manifest."""
+    file = folder.recording(split.name, row)
+    add_to_manifest(folder, {file.name: write(folder, source, split, row, episode, about)})
+
+
+def write(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> str:
+    """Writes the recording of an episode, with what the shipped success model predicts; returns its SHA-256.
 
     `about` names method, source of reaches and seed.
     """
@@ -38,8 +44,12 @@ def record(folder: RunFolder, source: Source, split: Split, row: int, episode: E
     properties = {**about, "split": split.name, "split_digest": split.digest, "row": row}
     properties["physics"] = model.mjcf_hash()
     file, path = folder.recording(split.name, row), source.path(episode.setting)
-    sha256 = recording.write(file, episode, path, properties, _predictions(source, split.cases[row], episode))
-    atomic.write_json(folder.manifest, manifest(folder) | {file.name: sha256})
+    return recording.write(file, episode, path, properties, _predictions(source, split.cases[row], episode))
+
+
+def add_to_manifest(folder: RunFolder, hashes: dict[str, str]) -> None:
+    """Adds the SHA-256 of recordings, by the file's name, to the manifest of a run."""
+    atomic.write_json(folder.manifest, manifest(folder) | hashes)
 
 
 def manifest(folder: RunFolder) -> dict[str, str]:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import re
 import subprocess
+from collections.abc import Iterable
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.storage import hashing
+from dextron_bench.storage.folders import visible
+
 PACKAGES = ("dextron-bench", "mujoco", "dm-control", "numpy", "scipy", "pandas", "pyarrow", "torch", "rerun-sdk")
+PLAYING = ("reaches", "world", "experts", "splits", "methods", "evaluation")  # Packages that episodes follow from.
+REACHES = "data/synthetic-reaches.npz"  # The file that synthetic reaches follow from.
 # Names in /proc/cpuinfo.
 VECTORS = re.compile(r"ssse3|sse\w*|avx\w*|fma4?|f16c|xop|amx\w*|neon|asimd\w*|sve\w*|sme(2\w*|[a-z]+\d\w*)?")
 
@@ -20,7 +28,7 @@ def collect(physics: str) -> dict[str, Any]:
     return {
         "git": _git("rev-parse", "HEAD"),
         "dirty": None if (changes := _git("status", "--porcelain")) is None else bool(changes),
-        "versions": {name: _version(name) for name in PACKAGES},
+        "versions": {name: version_of(name) for name in PACKAGES},
         "python": platform.python_version(),
         "machine": {
             "system": platform.platform(),
@@ -37,7 +45,48 @@ def physics_of(result: dict[str, Any]) -> str:
     return str((result.get("provenance") or {}).get("physics") or "")
 
 
-def _version(name: str) -> str | None:
+def merged(makers: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """The provenance of a file that several processes made: one of them, and under `others` the rest, without doubles.
+
+    It does not depend on the order of the processes. Processes of one machine with equal versions count as one.
+    """
+    distinct = {
+        json.dumps(one, sort_keys=True): one
+        for maker in makers
+        for one in ({name: maker[name] for name in maker if name != "others"}, *maker.get("others", ()))
+    }
+    first, *others = (distinct[text] for text in sorted(distinct))
+    return {**first, "others": others} if others else first
+
+
+def platform_of(maker: dict[str, Any]) -> str:
+    """What the last bits of episodes may depend on: the system, the processor with its instructions, and MuJoCo."""
+    machine, versions = maker.get("machine") or {}, maker.get("versions") or {}
+    extensions = hashing.digest(" ".join(machine.get("vector_extensions") or ()).encode())[:8]
+    system = str(machine.get("system")).partition("-")[0]
+    return f"{system}, {machine.get('cpu')} ({extensions}), MuJoCo {versions.get('mujoco')}"
+
+
+def code_hash(*more: Path) -> str:
+    """SHA-256 of the code that episodes follow from, and of more files, such as a method's."""
+    return hashing.digest(_code_hash().encode(), *(part for file in more for part in (file.name.encode(), _sha(file))))
+
+
+@cache
+def _code_hash() -> str:
+    package = Path(__file__).parents[1]
+    files = [file for name in PLAYING for end in ("py", "xml") for file in visible(package / name, f"**/*.{end}")]
+    names = [file.relative_to(package).as_posix() for file in files]
+    parts = (part for name, file in zip(names, files, strict=True) for part in (name.encode(), _sha(file)))
+    return hashing.digest(*parts, _sha(package / REACHES))
+
+
+def _sha(file: Path) -> bytes:
+    return hashing.sha256(file).encode()
+
+
+def version_of(name: str) -> str | None:
+    """The version of an installed package; None if it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:

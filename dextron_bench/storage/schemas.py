@@ -116,14 +116,12 @@ RETURN, COUNT, AMOUNT = number(0.0, FULL_RETURN), whole(), number(0.0, 1e300)
 OBJECT = map_of(anything)
 MACHINE = entries({}, {"system": text, "cpu": text, "cores": or_none(COUNT)})
 CODE = entries({"class": text, "sha256": or_none(text)})
-PROVENANCE = entries(
-    {},
-    {
-        **dict.fromkeys(("physics", "python"), text),
-        **{"git": or_none(text), "dirty": or_none(flag), "seconds": AMOUNT},
-        **{"versions": map_of(or_none(text)), "machine": MACHINE},
-    },
-)
+MAKER = {
+    **dict.fromkeys(("physics", "python"), text),
+    **{"git": or_none(text), "dirty": or_none(flag)},
+    **{"versions": map_of(or_none(text)), "machine": MACHINE},
+}
+PROVENANCE = entries({}, {**MAKER, "seconds": AMOUNT, "others": list_of(entries({}, MAKER))})
 TRAINING = entries(
     {},
     {
@@ -184,6 +182,8 @@ SWEEP = entries(
         **dict.fromkeys(("choice", "flags"), text),
     }
 )
+PIECE = entries({"name": text, "depends on": OBJECT, "code": text, "files": map_of(text), "provenance": PROVENANCE})
+FINDING = entries({"done": text, "problems": list_of(text), "actions": map_of(list_of(text))})
 NOTES = entries({"tags": list_of(text), "note": text})
 FAILURE = entries({"error": text})
 MANIFEST = entries({"name": text, "reaches": text, "seeds": list_of(COUNT, 1)}, {"declared": DECLARED})

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.storage import folder_config, tensors
 from dextron_bench.storage.progress import Progress, no_progress
-from dextron_bench.success import dataset
+from dextron_bench.success import block_pieces, dataset
 from dextron_bench.world import model, task
 
 KINDS = SOLVED, UNIFORM, POLICY = ("solved", "uniform", "policy")
@@ -53,6 +54,11 @@ class DatasetConfig:
         """The kind of a block's episodes, one of KINDS."""
         order = (SOLVED, POLICY, UNIFORM, POLICY) if self.policies else (SOLVED, UNIFORM)
         return order[number % len(order)]
+
+    @property
+    def cycle(self) -> int:
+        """Number of blocks after which the kinds repeat. A share has whole cycles, so that it sees every kind."""
+        return 4 if self.policies else 2
 
     def policy(self, number: int) -> str:
         """Name of the policy that plays a block of kind POLICY."""
@@ -98,22 +104,23 @@ def generate(
 ) -> dict[str, Tally]:
     """Plays blocks until the data set in a folder has at least `rows` transitions; returns a tally of each kind.
 
-    `agents` are the policies by name; `progress` receives numbers of transitions. Raises BadDatasetConfig,
-    FolderMismatch if the folder holds another data set, BadDataset if a block is damaged, and the errors of `rollout`.
+    `agents` are the policies by name; `progress` receives numbers of transitions. Blocks of shares are checked; the
+    data set gets those that it needs, and the others are removed. Raises BadDatasetConfig, FolderMismatch if the folder
+    holds another data set, BadDataset if a block is damaged, and the errors of `rollout` and of `shares.Work.read`.
     """
-    if rows < 1:
-        raise BadDatasetConfig(f"--rows is the number of transitions to generate, 1 or more, not {rows}")
-    _write_or_check_config(folder, config)
+    pieces = block_pieces.read(folder, write_or_check_config(folder, config, rows))
     tallies, number = {kind: Tally() for kind in KINDS}, 0
     while (done := sum(tally.rows for tally in tallies.values())) < rows:
         progress(done, rows)
-        file, kind = block_file(folder, number), config.kind(number)
-        if not file.exists():
-            agent = agents[config.policy(number)] if kind == POLICY else ExpertAgent()
-            _play(source, draw_cases(source, train, config, number), agent, threads, file)
-        tallies[kind] += block_tally(file)
+        file = block_file(folder, number)
+        if not file.exists() and number in pieces:
+            block_pieces.copy(pieces[number], file)
+        elif not file.exists():
+            play_block(source, train, config, number, agents, threads, file)
+        tallies[config.kind(number)] += block_tally(file)
         number += 1
     progress(done, rows)
+    block_pieces.work(folder).remove(pieces.values())
     return tallies
 
 
@@ -128,17 +135,35 @@ def block_tally(file: Path) -> Tally:
     return Tally(len(arrays["actions"]), len(arrays["solved"]), int(arrays["solved"].sum()))
 
 
-def _write_or_check_config(folder: Path, config: DatasetConfig) -> None:
+def write_or_check_config(folder: Path, config: DatasetConfig, rows: int) -> dict[str, Any]:
+    """Writes the config of a data set, or checks that the folder has no other; returns what the file holds.
+
+    Raises FolderMismatch, BadDatasetConfig.
+    """
+    if rows < 1:
+        raise BadDatasetConfig(f"--rows is the number of transitions to generate, 1 or more, not {rows}")
     content = {"search": asdict(config), "physics": model.mjcf_hash()}
     advice = "choose another folder, or remove it"
     folder_config.write_or_check_file(folder / dataset.CONFIG, content, "data set", advice)
+    return content
 
 
-def _play(source: Source, cases: Sequence[Case], agent: Agent, threads: int, file: Path) -> None:
-    """Plays a block and writes its file: states (R, 48) and actions (R,) as float32, `starts` (E + 1,), `solved` (E,).
+def play_block(
+    source: Source,
+    train: Sequence[Case],
+    config: DatasetConfig,
+    number: int,
+    agents: Mapping[str, Agent],
+    threads: int,
+    file: Path,
+) -> None:
+    """Plays the block with a number and writes its file.
 
-    Episode k has the rows from `starts[k]` to before `starts[k + 1]`, one for each of its actions.
+    The file has states (R, 48) and actions (R,) as float32, `starts` (E + 1,) and `solved` (E,). Episode k has the rows
+    from `starts[k]` to before `starts[k + 1]`, one for each of its actions.
     """
+    agent = agents[config.policy(number)] if config.kind(number) == POLICY else ExpertAgent()
+    cases = draw_cases(source, train, config, number)
     played = dict(rollout(agent, source, cases, threads=threads))
     episodes = [played[row] for row in range(len(cases))]
     solved = np.array([episode.score == task.SUCCESS for episode in episodes], np.uint8)

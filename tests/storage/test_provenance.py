@@ -24,7 +24,7 @@ def test_provenance_is_plain_json_and_names_code_versions_and_machine():
 
 
 def test_a_missing_package_has_no_version():
-    assert provenance._version("nosuchpackage") is None
+    assert provenance.version_of("nosuchpackage") is None
 
 
 def test_without_git_the_commit_is_unknown(monkeypatch: pytest.MonkeyPatch):

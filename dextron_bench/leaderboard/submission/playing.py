@@ -16,9 +16,10 @@ from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent, Limits
 from dextron_bench.methods.isolation.launch import Launch
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import Source
-from dextron_bench.runs import execution, result_files
+from dextron_bench.runs import result_files
+from dextron_bench.runs.evaluation_job import EvaluationJob, Played
 from dextron_bench.splits.loading import Split, load_split, ranking_splits
-from dextron_bench.storage import folder_config, hashing
+from dextron_bench.storage import folder_config, hashing, provenance
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 
@@ -30,24 +31,45 @@ def play_entry(
 
     Raises AgentError if the agent does not start, FolderMismatch if the folder belongs to another entry, MissingData.
     """
-    folder, source = entry.folder(runs), sources.open_source(entry.reaches)
-    bundle.check({"format": bundle.FORMAT, **entry.manifest(), "files": {}}, "bundle", folder)
-    bundle.check_agent(entry.files())
-    splits = [load_split(entry.reaches, name) for name in ranking_splits(entry.reaches)]
-    for seed in entry.seeds:
-        run = RunFolder.of_seed(folder, seed)
-        folder_config.write_or_check(run.path, _config(entry, seed))
-        about = {"method": entry.name, "reaches": entry.reaches, "seed": seed}
+    for job in prepare_all(entry, runs, record, limits, threads):
 
-        def play(split: Split, seed: int = seed) -> execution.Played:
-            return play_shuffled(entry.launch, source, split, seed, limits, threads)
-
-        def report_seed(done: int, total: int, note: str = "", seed: int = seed) -> None:
+        def report_seed(done: int, total: int, note: str = "", seed: int = job.folder.seed) -> None:
             report(done, total, f"seed {seed}")
 
-        table = execution.evaluate(run, source, splits, play, record, about, report_seed)
-        result_files.write_result(run, table, about)
-    return folder
+        result_files.write_result(job.folder, job.table(report_seed), job.facts)
+    return entry.folder(runs)
+
+
+def prepare_all(entry: Entry, runs: Path, record: int, limits: Limits, threads: int = 0) -> list[EvaluationJob]:
+    """The evaluation of each seed of an entry; writes the configs of their folders.
+
+    A piece of an evaluation is a whole split, since its rows are shuffled. Raises BadBundle if a bundle could not hold
+    the entry, FolderMismatch, MissingData.
+    """
+    bundle.check({"format": bundle.FORMAT, **entry.manifest(), "files": {}}, "bundle", entry.folder(runs))
+    bundle.check_agent(entry.files())
+    source = sources.open_source(entry.reaches)
+    return [
+        _prepare(entry, source, RunFolder.of_seed(entry.folder(runs), seed), record, limits, threads)
+        for seed in entry.seeds
+    ]
+
+
+def _prepare(
+    entry: Entry, source: Source, folder: RunFolder, record: int, limits: Limits, threads: int
+) -> EvaluationJob:
+    """The evaluation of one seed."""
+    splits = [load_split(entry.reaches, name) for name in ranking_splits(entry.reaches)]
+    config = _config(entry, folder.seed)
+    folder_config.write_or_check(folder.path, config)
+    about = {"method": entry.name, "reaches": entry.reaches, "seed": folder.seed}
+
+    def play(split: Split, rows: range) -> Played:
+        return play_shuffled(entry.launch, source, split, folder.seed, limits, threads)
+
+    return EvaluationJob(
+        folder, source, splits, play, record, about, about, config, provenance.code_hash(), one_platform=True
+    )
 
 
 def play_shuffled(

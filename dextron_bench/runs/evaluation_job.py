@@ -1,0 +1,184 @@
+"""The evaluation of one run: its episodes on splits, played at once or in pieces (`storage/shares.py`).
+
+A piece is some rows of a split, or the whole split if the agent does not promise that its rows are independent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from dextron_bench.evaluation import episode_table
+from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.reaches.setting import Source
+from dextron_bench.runs import recording_files, run_files
+from dextron_bench.splits.loading import Split
+from dextron_bench.storage import atomic, provenance, schemas, shares, tables
+from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.run_folder import RunFolder
+
+ROWS = 128  # In a piece. With other numbers, pieces of different versions do not fit together.
+Played = Iterator[tuple[int, Episode]]  # Rows and their episodes, as these end.
+
+
+@dataclass(frozen=True, slots=True)
+class RowPiece:
+    """Some rows of a split."""
+
+    split: Split
+    rows: range
+
+    @property
+    def name(self) -> str:
+        """The name of the piece, such as `test-0000-0127`: the split, the first row and the last."""
+        return f"{self.split.name}-{self.rows[0]:04d}-{self.rows[-1]:04d}"
+
+
+@dataclass(frozen=True)
+class EvaluationJob:
+    """The episodes of a run on splits, in its folder.
+
+    `play` plays rows of a split and yields (row, episode) as episodes end. The first `record` rows of each split are
+    recorded, with `about` among their properties. `facts` are what the result says of the run. `config` is what the
+    episodes depend on besides split and rows, and `code` the hash of the code. With `rows_are_independent`, any rows
+    may be played together. With `one_platform`, pieces of different platforms do not fit together.
+    """
+
+    folder: RunFolder
+    source: Source
+    splits: Sequence[Split]
+    play: Callable[[Split, range], Played]
+    record: int
+    about: dict[str, Any]
+    facts: dict[str, Any]
+    config: Mapping[str, Any]
+    code: str
+    rows_are_independent: bool = False
+    one_platform: bool = False
+
+    def pieces(self) -> list[RowPiece]:
+        """All pieces, in order; they do not depend on what is done already."""
+        return [piece for split in self.splits for piece in self._pieces_of(split)]
+
+    def done(self) -> set[str]:
+        """Names of the pieces whose episodes are in the folder; raises the errors of `Work.read`, and DamagedFile."""
+        table = run_files.stored_episodes(self.folder, self.splits)
+        complete = {split.name for split in self.splits if self._is_stored(split, table)}
+        return {piece.name for piece in self.pieces() if piece.split.name in complete} | self._stored_pieces().keys()
+
+    def play_piece(self, piece: RowPiece, report: Progress = no_progress) -> None:
+        """Plays a piece and writes its files; `report` receives episodes."""
+        rows, files = self._play_rows(piece.split, piece.rows, recording_files.write, report)
+        table = self._work.file(piece.name, ".parquet")
+        tables.write(table, pd.DataFrame(rows))
+        self._work.write(piece.name, self._config_of(piece), [table, *files])
+
+    def table(self, report: Progress = no_progress) -> pd.DataFrame:
+        """The table of episodes; plays what the folder lacks, and stores the table after each split.
+
+        Pieces in the folder are checked, put into the table and then removed. Raises the errors of `Work.read`.
+        """
+        table, pieces = run_files.stored_episodes(self.folder, self.splits), self._stored_pieces()
+        left = [split for split in self.splits if not self._is_stored(split, table)]
+        if pieces:
+            self._write_provenance(pieces, left)
+        for split in left:
+            rows = self._rows_of_split(split, pieces, report)
+            table = _with_split(table, split.name, rows)
+            run_files.store_episodes(self.folder, table)
+        self._work.remove(pieces.values())
+        return table
+
+    @property
+    def _work(self) -> shares.Work:
+        return shares.Work(self.folder.path, self.code)
+
+    def _pieces_of(self, split: Split) -> list[RowPiece]:
+        size = ROWS if self.rows_are_independent else len(split.cases)
+        starts = range(0, len(split.cases), size)
+        return [RowPiece(split, range(start, min(start + size, len(split.cases)))) for start in starts]
+
+    def _config_of(self, piece: RowPiece) -> dict[str, Any]:
+        """What the files of a piece depend on."""
+        recorded = sum(row < self.record for row in piece.rows)
+        return {**self.config, "split": piece.split.digest, "recorded episodes": recorded}
+
+    def _is_stored(self, split: Split, table: pd.DataFrame) -> bool:
+        """True if the table has a split's episodes, and the folder has their recordings."""
+        stored = table[table["split"] == split.name] if len(table) else table
+        return len(stored) == len(split.cases) and not recording_files.any_missing(self.folder, stored, self.record)
+
+    def _stored_pieces(self) -> dict[str, shares.Piece]:
+        return self._work.read({piece.name: self._config_of(piece) for piece in self.pieces()}.get)
+
+    def _rows_of_split(self, split: Split, pieces: dict[str, shares.Piece], report: Progress) -> list[dict[str, Any]]:
+        """The rows of all episodes of a split, in order: from its pieces, and played where there are none."""
+        parts = self._pieces_of(split)
+        if not any(part.name in pieces for part in parts):
+            return self._play_rows(split, range(len(split.cases)), recording_files.record, report)[0]
+        for part in parts:
+            if part.name not in pieces:
+                self.play_piece(part, report)
+                pieces |= self._work.read({part.name: self._config_of(part)}.get)
+        return [row for part in parts for row in self._rows_of_piece(part.name, pieces[part.name])]
+
+    def _rows_of_piece(self, name: str, piece: shares.Piece) -> list[dict[str, Any]]:
+        """The rows of a piece; adds its recordings to the manifest. Raises DamagedFile."""
+        file = self._work.file(name, ".parquet")
+        try:
+            table = tables.read(file, tables.EPISODES)
+        except tables.BadTable as error:
+            raise atomic.DamagedFile(file, error) from error
+        if hashes := {place.name: sha256 for place, sha256 in piece.files.items() if place != file}:
+            recording_files.add_to_manifest(self.folder, hashes)
+        return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
+
+    def _play_rows(
+        self, split: Split, rows: range, record: Callable[..., object], report: Progress
+    ) -> tuple[list[dict[str, Any]], list[Path]]:
+        """Plays rows of a split; returns their rows of the table, in order, and the recordings that were written."""
+        played: dict[int, dict[str, Any]] = {}
+        files = []
+        for row, episode in self.play(split, rows):
+            played[row] = episode_table.row(split, row, episode)
+            if row < self.record and len(episode.actions):
+                record(self.folder, self.source, split, row, episode, self.about)
+                files.append(self.folder.recording(split.name, row))
+            report(len(played), len(rows))
+        return [played[row] for row in sorted(played)], files
+
+    def _write_provenance(self, pieces: Mapping[str, shares.Piece], left: Sequence[Split]) -> None:
+        """Replaces the run's provenance by the provenance of all that make it: pieces, earlier episodes, this process.
+
+        It is written before the episodes, so that a merge that was killed ends with the same bytes. Raises
+        ForeignPiece.
+        """
+        makers = [piece.provenance for piece in pieces.values()]
+        if self.folder.episodes.exists() or self.folder.curve.exists():
+            makers.append(schemas.read(self.folder.provenance, schemas.PROVENANCE))
+        if any(part.name not in pieces for split in left for part in self._pieces_of(split)):
+            makers.append(provenance.collect(self.config["physics"]))
+        merged = provenance.merged(makers)
+        if self.one_platform and "others" in merged:
+            self._check_platform(merged)
+            del merged["others"]
+        atomic.write_json(self.folder.provenance, merged)
+
+    def _check_platform(self, merged: dict[str, Any]) -> None:
+        """Raises ForeignPiece if some makers have another platform than the first."""
+        platforms = {provenance.platform_of(maker) for maker in (merged, *merged["others"])}
+        if len(platforms) > 1:
+            raise shares.ForeignPiece(
+                f"{self.folder.path} has pieces of different platforms: {' and '.join(sorted(platforms))}; it may name "
+                "one only: play all pieces on machines of one kind"
+            )
+
+
+def _with_split(table: pd.DataFrame, split: str, rows: list[dict[str, Any]]) -> pd.DataFrame:
+    """The table with other rows of a split, at its end."""
+    others = [table[table["split"] != split]] if len(table) else []
+    return pd.concat([*others, pd.DataFrame(rows)], ignore_index=True)
