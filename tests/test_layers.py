@@ -25,6 +25,7 @@ LEVELS = {
     "training": 6,
     "runs": 7,
     "scores": 7,
+    "tracking": 7,
     "baselines": 7,
     "leaderboard": 8,
     "cli": 9,
@@ -35,6 +36,9 @@ SDKS = {  # Packages of others that one place alone imports.
     "matplotlib": "dextron_bench/scores/figures.py",
     "minari": "dextron_bench/evaluation/minari_export.py",
     "av": "dextron_bench/recording/film.py",
+    "tensorboard": "dextron_bench/tracking/to_tensorboard.py",
+    "trackio": "dextron_bench/tracking/to_trackio.py",
+    "wandb": "dextron_bench/tracking/to_wandb.py",
     "tyro": "dextron_bench/cli/",
     "rich": "dextron_bench/cli/",
 }
