@@ -38,12 +38,10 @@ PACKAGES = (
     *("mujoco", "dm-control", "gymnasium", "numpy", "scipy", "torch", "safetensors"),
     *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "pillow", "tyro", "rich", "jsonschema", "threadpoolctl"),
 )
-EXTRAS = {
-    "minari": "minari",
-    "av": "video",
-    "onnxruntime": "onnx",
-    "optuna": "sweep",
-}  # By package: the extra that installs it.
+EXTRAS = {  # By package: the extra that installs it.
+    **{"minari": "minari", "av": "video", "onnxruntime": "onnx", "optuna": "sweep"},
+    **{"tensorboard": "tensorboard", "trackio": "trackio", "wandb": "wandb"},
+}
 RENDERERS = ("egl", "osmesa", "glfw")
 TIMEOUT = 30.0  # [s] for one renderer.
 RENDER = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 64, 64).render()"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -14,6 +16,8 @@ from dextron_bench.cli.leaderboard import print_rows
 from dextron_bench.cli.method_flags import settings_dict
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
+
+TrackerName = Literal["rerun", "tensorboard", "trackio", "wandb"]
 
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
@@ -47,6 +51,10 @@ class Run:
     """How many episodes of each split to record, from the first."""
     floors: bool = True
     """Also evaluate the two floors for comparison: an agent that does nothing and a random one."""
+    tracker: tuple[TrackerName, ...] = ()
+    """Show the training in these trackers while it runs (docs/following.md)."""
+    live: bool = False
+    """Show the training in Rerun's viewer while it runs."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     threads: int = 0
@@ -66,6 +74,10 @@ class Run:
     method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
+        if self.tracker:
+            from dextron_bench.tracking import packages
+
+            packages.require(self.tracker)
         share, groups = shares.parse(self.share, self.merge), self._groups()
         if self.dry_run:
             return self._estimate(groups)
@@ -107,6 +119,7 @@ class Run:
         for group in groups:
             with (
                 annotations.noting_failure([run.folder(self.runs) for run in group]),
+                self._following(group),
                 progress_bar(f"{group[0].label}, epochs", self.quiet) as progress,
             ):
                 execution.train(group, self.runs, self.threads, self.device, progress)
@@ -129,6 +142,17 @@ class Run:
             both["from"] = both["method"].isin(rows["method"]).map({True: "this run", False: "published"})
             print_rows(both[both["split"].isin(played)])
         return EPISODES_FAILED if rows["failed"].any() else DONE
+
+    def _following(self, group: list[plans.Run]) -> AbstractContextManager[None]:
+        """Trackers follow the trainings of a group, in processes of their own."""
+        names = [*dict.fromkeys(self.tracker), *(["live"] if self.live else [])]
+        job = group[0].training_job(self.runs)
+        if not names or job is None:
+            return nullcontext()
+        from dextron_bench.tracking import launch
+
+        folders = job.training_folders([run.seed for run in group])
+        return launch.following(folders, names, lambda line: print(f"dextron-bench: {line}", file=sys.stderr))
 
     def _estimate(self, groups: list[list[plans.Run]]) -> int:
         from dextron_bench.runs.estimates import estimate

@@ -28,9 +28,12 @@ class View(EpisodeFlags):
     replayed from their actions and recorded in the folder of their run.
 
     With --diff, two agents appear side by side on the same setting: two recordings, or two runs on the first row that
-    only one of them solves. With --live, a policy plays --row of --split while you watch.
+    only one of them solves. With --live and a place, the window follows the trainings there, running or finished:
+    curves, and the newest episodes of each seed. With --live and --method, a policy plays --row of --split.
 
     Example: dextron-bench view runs/exp/synthetic/seed0
+
+    Example: dextron-bench view --live runs/rlil-0.1/synthetic
 
     Example: dextron-bench view --live --method rlil --reaches synthetic
 
@@ -46,7 +49,7 @@ class View(EpisodeFlags):
     diff: bool = False
     """Show two places side by side."""
     live: bool = False
-    """Watch --method, a name on the leaderboard or in `list`, with its shipped weights."""
+    """Follow a training, or watch --method, a name on the leaderboard or in `list`, with its shipped weights."""
     speed: float = 1.0
     """Speed of --live, as a multiple of real time; 0 means without delay."""
     runs: Path = Path("runs")
@@ -60,7 +63,7 @@ class View(EpisodeFlags):
         from dextron_bench import recording
 
         if self.live:
-            return self._play_live()
+            return self._follow_training() if self.place else self._play_live()
         places, episode_filter = self._places(), self.episode_filter()
         files = [self._side_by_side(places, episode_filter)] if self.diff else self._recordings(places, episode_filter)
         undamaged = _undamaged(files)
@@ -92,6 +95,18 @@ class View(EpisodeFlags):
         first, second = places
         return side_by_side.side_by_side(first, second, episode_filter, self.runs)
 
+    def _follow_training(self) -> int:
+        """Shows the trainings at the places until the user closes the window."""
+        from dextron_bench.tracking import live
+        from dextron_bench.tracking.training_files import TrainingFiles, training_folders
+
+        folders = {folder: seeds for place in self.place for folder, seeds in training_folders(place).items()}
+        trainings = [TrainingFiles(folder, seeds) for folder, seeds in folders.items()]
+        counts = live.watch(trainings, lambda: all(files.is_over for files in trainings))
+        lost = f"; {counts.dropped} could not be shown ({counts.error})" if counts.dropped else ""
+        print(f"{', '.join(files.name for files in trainings)}: {counts.points} points shown{lost}")
+        return DONE
+
     def _play_live(self) -> int:
         from dextron_bench import recording
         from dextron_bench.methods import weights
@@ -120,7 +135,7 @@ class View(EpisodeFlags):
         from dextron_bench.runs.selection import BadFilter
 
         if len(self.method) != 1:
-            raise BadFilter("--live takes one --method, such as rlil or exp")
+            raise BadFilter("--live takes the folder of a training, or one --method, such as rlil or exp")
         if not 0.0 <= self.speed < float("inf"):
             raise BadFilter(f"--speed must be a multiple of real time, or 0 for no delay, not {self.speed:g}")
 

@@ -13,7 +13,7 @@ from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.runs import recording_files, result_files, run_files
 from dextron_bench.storage import atomic, schemas
 from dextron_bench.storage.folders import visible
-from dextron_bench.storage.run_folder import RunFolder, below
+from dextron_bench.storage.run_folder import TRACKING, RunFolder, below
 
 LIMIT = 5  # Episodes that are selected if the filter names no number.
 
@@ -56,11 +56,16 @@ def recordings(places: Sequence[Path]) -> list[Path]:
     for place in places:
         if not place.exists():
             raise NoEpisodes(f"{place} does not exist; `dextron-bench run --record 3` makes recordings, in runs")
-        place_files = [place] if place.is_file() else [file for file in visible(place, "**/*.rrd") if file.is_file()]
+        place_files = [place] if place.is_file() else [file for file in visible(place, "**/*.rrd") if _is_episode(file)]
         if not place_files:
             raise NoEpisodes(f"no recordings at {place}; make some with `dextron-bench run --record 3`")
         files |= dict.fromkeys(place_files)
     return list(files)
+
+
+def _is_episode(file: Path) -> bool:
+    """True for a file that may be the recording of an episode; a tracker's file of a whole training is none."""
+    return file.is_file() and not any(part.startswith(TRACKING) for part in file.parts[-3:-1])
 
 
 def hashes(files: Sequence[Path]) -> dict[Path, str]:

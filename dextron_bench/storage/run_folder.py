@@ -12,6 +12,7 @@ from pathlib import Path
 from dextron_bench.storage.folders import visible
 
 SEED = "seed"  # The folder of seed 3 is `seed3`.
+TRACKING = "tracking-"  # The files of trackers of `training-0+1` are in `tracking-0+1`.
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -1,8 +1,8 @@
 """The folder of a training: everything that an interrupted training needs to continue and end with the same bytes.
 
-After each period the files are written in this order: journal, snapshots of weights, metrics, checkpoint. The
-checkpoint says how many epochs are done, and lists the SHA-256 of all that belongs to it. If the other files hold later
-epochs, their period was interrupted: `resume` removes these parts, and the training writes them again.
+After each epoch its metrics are written. After each period follow, in this order: journal, snapshots of weights,
+checkpoint. The checkpoint says how many epochs are done, and lists the SHA-256 of all that belongs to it. If the other
+files hold later epochs, their period was interrupted: `resume` removes these parts, and the training writes them again.
 """
 
 from __future__ import annotations
@@ -106,14 +106,18 @@ class Checkpoints:
     def save(
         self, trainer: Trainer, progress: TrainingProgress, rows: list[dict[str, Any]], about: dict[str, Any]
     ) -> None:
-        """Writes the files of a period with the metrics `rows`; `about` becomes metadata of the weights."""
+        """Writes the files of a period.
+
+        `rows` are the metrics of its last epoch, which `metric_rows` has written; `about` becomes metadata of the
+        weights.
+        """
         epoch = progress.epoch
         tensors.write(self._journal(epoch), trainer.journal(), {"epoch": epoch})
         frames = {row["seed"]: row.get("frames") for row in rows}
         for seed, arrays in zip(self.seeds, trainer.weights(), strict=True):
             metadata = {**about, "seed": seed, "seeds": self.seeds, "epoch": epoch, "frames": frames.get(seed)}
             tensors.write(self.snapshot(epoch, seed), arrays, metadata)
-        metric_rows.append(self.folder, rows)
+        metric_rows.sync(self.folder)
         state = trainer.state()
         written = [self._journal(epoch), *(self.snapshot(epoch, seed) for seed in self.seeds)]
         self._listed |= checkpoint_list.hashes(self.folder, written)

@@ -71,6 +71,11 @@ class TrainingJob:
         """The folder in which a group of seeds trains."""
         return loop.folder_of(self._source_folder, group)
 
+    def training_folders(self, seeds: Sequence[int]) -> list[Path]:
+        """The folders in which seeds train, or have been trained."""
+        trained = [group for group in self._finished() if set(group) & set(seeds)]
+        return [self.training_folder(group) for group in dict.fromkeys([*trained, *self.groups(seeds)])]
+
     def seconds(self, seed: int) -> float | None:
         """Duration of the training of a seed's group [s]; None if there is no such training."""
         groups = [group for group in self._finished() if seed in group]

@@ -1,6 +1,7 @@
 """The learning curve: the scores of a training's snapshots on `val`, and the best snapshot.
 
-A score depends only on the snapshot's file and on `val`, and is stored beside the file.
+A score depends only on the snapshot's file and on `val`, and is stored beside the file, with the actions of a few
+episodes.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.world import task
 
 POINT_ROWS = 50  # Rows of `val` that make a point of the curve.
+SHOWN_ROWS = 2  # Rows of `val` whose actions are stored with the scores, so that these episodes can be watched.
 FINALISTS = 5  # Snapshots with the best points; their scores on all of `val` decide between them.
 
 
@@ -79,11 +81,13 @@ class Curve:
         return scores
 
     def _play_and_store(self, snapshot: Path, file: Path, rows: int) -> list[float]:
-        scores = self._play(snapshot, rows)
-        atomic.write_json(file, {"digest": self._val.digest, "scores": scores, "sha256": _sha256(scores)})
+        scores, actions = self._play(snapshot, rows)
+        content = {"digest": self._val.digest, "scores": scores, "sha256": _sha256(scores), "actions": actions}
+        atomic.write_json(file, content)
         return scores
 
-    def _play(self, snapshot: Path, rows: int) -> list[float]:
+    def _play(self, snapshot: Path, rows: int) -> tuple[list[float], list[list[float]]]:
+        """Scores on the first rows of `val`, and the actions on the first SHOWN_ROWS."""
         try:
             weights = tensors.read(snapshot)
         except (tensors.BadTensors, FileNotFoundError) as error:
@@ -91,8 +95,12 @@ class Curve:
         with as_agent_error(f"policy() of method {self._learner.name!r}"):
             agent = self._learner.policy(weights)
         cases = self._val.cases[:rows]
-        scores = {row: episode.score for row, episode in rollout(agent, self._source, cases, threads=self._threads)}
-        return [scores[row] for row in range(rows)]
+        scores, actions = dict[int, float](), dict[int, list[float]]()
+        for row, episode in rollout(agent, self._source, cases, threads=self._threads):
+            scores[row] = episode.score
+            if row < SHOWN_ROWS:
+                actions[row] = episode.actions[:, 0].tolist()
+        return [scores[row] for row in range(rows)], [actions[row] for row in sorted(actions)]
 
 
 def _sha256(scores: list[float]) -> str:

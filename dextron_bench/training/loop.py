@@ -20,7 +20,7 @@ from dextron_bench.splits.loading import Split
 from dextron_bench.storage import folder_config, hashing
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
-from dextron_bench.training import timing
+from dextron_bench.training import metric_rows, timing
 from dextron_bench.training.checkpoints import Checkpoints, TrainingProgress
 from dextron_bench.training.learning_curve import FINALISTS, Curve
 from dextron_bench.world import model
@@ -42,10 +42,15 @@ def folder_of(base: Path, seeds: Sequence[int]) -> Path:
     return base / f"training-{'+'.join(map(str, seeds))}"
 
 
+def seeds_of(folder: Path) -> tuple[int, ...]:
+    """The seeds in the name of a folder; none if `folder_of` does not name folders so."""
+    match = NAME.fullmatch(folder.name)
+    return tuple(map(int, match[1].split("+"))) if match else ()
+
+
 def training_folders(base: Path, below: str = "") -> dict[Path, tuple[int, ...]]:
     """The folders that `folder_of` names, with their seeds; `below` is a pattern of folders between, as "*/*/"."""
-    matches = {folder: NAME.fullmatch(folder.name) for folder in visible(base, f"{below}training-*")}
-    return {folder: tuple(map(int, match[1].split("+"))) for folder, match in matches.items() if match}
+    return {folder: seeds for folder in visible(base, f"{below}training-*") if (seeds := seeds_of(folder))}
 
 
 def no_watch(curves: dict[int, list[dict[str, Any]]]) -> None:
@@ -133,10 +138,14 @@ class _TrainingRun:
             self._show_curves()
 
     def _train_period(self, trainer: Trainer, last: int, note: str) -> None:
-        """Trains until an epoch, the last of a period, and writes the checkpoint; `note` goes with the progress."""
+        """Trains until an epoch, the last of a period, with its metrics after each epoch, and writes the checkpoint.
+
+        `note` goes with the progress.
+        """
         rows: list[dict[str, Any]] = []
         while trainer.epoch < last:
-            rows += self._epoch(trainer)
+            rows = self._epoch(trainer)
+            metric_rows.append(self._checkpoints.folder, rows)
             self._report(trainer.epoch, self._learner.epochs, note)
         progress = TrainingProgress(last, self._learner.epochs, self._track.device)
         self._checkpoints.save(trainer, progress, rows, self._about())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,16 @@ METRICS = "metrics.jsonl"  # In the folder of a training.
 
 
 def append(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Adds rows at the end; they are on the disk afterwards."""
+    """Adds rows at the end, where other processes can read them at once."""
     file = folder / METRICS
     with atomic.naming(file), file.open("a", encoding="utf-8") as content:
         content.write("".join(json.dumps(row, sort_keys=True) + "\n" for row in rows))
-        content.flush()
-        os.fsync(content.fileno())
+
+
+def sync(folder: Path) -> None:
+    """Writes all rows to the disk, so that they survive a power failure."""
+    with atomic.naming(folder / METRICS):
+        atomic.sync(folder / METRICS)
 
 
 def read(folder: Path) -> list[dict[str, Any]]:

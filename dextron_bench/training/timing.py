@@ -1,9 +1,11 @@
-"""Durations of epochs and evaluations of a training, and estimates made of them."""
+"""Durations of epochs and evaluations of a training with the memory in use, and estimates made of them."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
+from contextlib import suppress
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -15,10 +17,23 @@ RECENT = 50  # Newest rows that an estimate uses.
 
 
 def append(folder: Path, activity: str, epoch: int, seconds: float, device: str) -> None:
-    """Adds a row: `activity` is "epoch" or "evaluation"."""
-    row = {"what": activity, "epoch": epoch, "seconds": round(seconds, 4), "device": device}
+    """Adds a row, with the memory in use: `activity` is "epoch" or "evaluation"."""
+    row = {"what": activity, "epoch": epoch, "seconds": round(seconds, 4), "device": device, **memory(device)}
     with atomic.naming(folder / FILE), (folder / FILE).open("a", encoding="utf-8") as file:
         file.write(json.dumps(row) + "\n")
+
+
+def memory(device: str) -> dict[str, float]:
+    """Memory of this process [MB]: `memory` of the machine, if it is known, and `device_memory` of a GPU."""
+    amounts = {}
+    with suppress(OSError, ValueError, IndexError):  # Only Linux has this file.
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        amounts["memory"] = round(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, 1)
+    if device != "cpu":
+        import torch
+
+        amounts["device_memory"] = round(torch.cuda.memory_allocated(device) / 1e6, 1)
+    return amounts
 
 
 def seconds_left(folder: Path, epochs: int, period: int) -> float | None:

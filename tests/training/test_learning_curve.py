@@ -50,6 +50,17 @@ def test_the_last_point_is_the_mean_of_the_newest_snapshot(tmp_path: Path):
     assert Curve(QUICK, Checkpoints(tmp_path / "empty", SEEDS), SOURCE, val).last_point() == {}
 
 
+def test_the_actions_of_the_first_rows_are_stored_and_may_be_missing(tmp_path: Path):
+    """Earlier versions stored only scores."""
+    checkpoints = train(tmp_path / "a", val=load_split("synthetic", "test"))
+    file = checkpoints.snapshot(2, 0).with_name("seed0-val2.json")
+    content = json.loads(file.read_text())
+    assert content["actions"] == [[score / 20] * 3 for score in content["scores"]]
+    del content["actions"]
+    file.write_text(json.dumps(content))
+    assert Curve(QUICK, checkpoints, SOURCE, load_split("synthetic", "test")).points(0)[0]["epoch"] == 2
+
+
 def test_scores_on_another_version_of_val_do_not_count(tmp_path: Path):
     checkpoints = train(tmp_path / "a")
     file = checkpoints.snapshot(2, 0).with_name("seed0-val1.json")

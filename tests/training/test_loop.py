@@ -12,7 +12,7 @@ from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.storage import atomic, tensors
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
-from dextron_bench.training import learning_curve, loop
+from dextron_bench.training import learning_curve, loop, metric_rows
 from dextron_bench.training.checkpoints import Busy, Checkpoints
 from dextron_bench.training.loop import Diverged
 from tests.helpers import tiny_training
@@ -111,6 +111,32 @@ def test_a_training_killed_before_or_after_any_write_ends_with_the_same_bytes(
         train(folder)
         assert tiny_training.contents(folder) == unbroken, writes
     assert writes == 2 * (2 + 3 * 6)  # Two files at the start, six in each period.
+
+
+def test_a_training_killed_after_the_metrics_of_any_epoch_ends_with_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Rows after the last checkpoint are cut when the training is resumed, and written again."""
+    train(tmp_path / "unbroken")
+    unbroken = tiny_training.contents(tmp_path / "unbroken")
+    append = metric_rows.append
+    for last in range(1, 6):
+        folder = tmp_path / f"killed{last}"
+
+        def killed(place: Path, rows: Any, last: int = last) -> None:
+            append(place, rows)
+            if rows[0]["epoch"] == last:
+                raise Killed
+
+        with monkeypatch.context() as patched:
+            patched.setattr(metric_rows, "append", killed)
+            with pytest.raises(Killed):
+                train(folder)
+        assert len(metric_rows.read(folder)) == 2 * last  # Before any checkpoint of this epoch.
+        progress = Checkpoints(folder, SEEDS).progress()
+        assert (progress.epoch if progress else 0) == {1: 0, 2: 0, 3: 2, 4: 2, 5: 4}[last]
+        train(folder)
+        assert tiny_training.contents(folder) == unbroken, last
 
 
 def test_a_training_depends_on_journal_and_streams(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

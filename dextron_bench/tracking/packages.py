@@ -1,0 +1,20 @@
+"""The packages that trackers need."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Sequence
+
+
+class MissingTracker(ValueError):
+    """A tracker whose package is not installed."""
+
+
+def require(names: Sequence[str]) -> None:
+    """Raises MissingTracker if the package of a tracker is not installed; imports none of them."""
+    missing = [name for name in names if name != "rerun" and importlib.util.find_spec(name) is None]
+    if missing:
+        raise MissingTracker(
+            f"--tracker {missing[0]} needs the package of this name: `pip install {missing[0]}`, "
+            f"or the extra: `pip install 'dextron-bench[{missing[0]}]'`"
+        )

@@ -1,0 +1,77 @@
+"""A tracker's own process: follows a training until its standard input ends, which `launch` closes after the training.
+
+So it also ends if the process that trains is killed.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import threading
+import time
+from pathlib import Path
+
+from dextron_bench.tracking import live, trackers
+from dextron_bench.tracking.follower import Counts, Follower
+from dextron_bench.tracking.launch import LIVE, counts_file
+from dextron_bench.tracking.training_files import TrainingFiles
+from dextron_bench.training import loop
+
+NICE = 10  # Lower priority than the training on a busy machine.
+
+
+def main(name: str, folder: Path, into: Path, grace: float) -> None:
+    """Follows the training in `folder`; files go `into` a folder, counts beside it.
+
+    After the training it takes `grace` [s] at most to show the rest.
+    """
+    ended = _EndOfInput()
+    files = TrainingFiles(folder, loop.seeds_of(folder))
+    shutil.rmtree(into, ignore_errors=True)  # It is written anew, from the first epoch on: nothing is there twice.
+    try:
+        _follow(name, files, into, ended, grace)
+    except Exception as error:
+        Counts(error=f"{type(error).__name__}: {' '.join(str(error).split())}").write(counts_file(into))
+        raise
+
+
+def _follow(name: str, files: TrainingFiles, into: Path, ended: _EndOfInput, grace: float) -> None:
+    def note(counts: Counts) -> None:
+        counts.write(counts_file(into))
+
+    if name == LIVE:
+        live.watch([files], ended.is_set, note)
+        return
+    follower = Follower(files, trackers.create(name, files, into))
+    follower.run(ended.is_set, lambda: ended.seconds > grace, note)
+
+
+class _EndOfInput(threading.Thread):
+    """Notices when the standard input ends."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        self._time = 0.0
+        self.start()
+
+    def run(self) -> None:
+        """Reads until there is no more."""
+        while sys.stdin.buffer.read(1):
+            pass
+        self._time = time.monotonic()
+
+    def is_set(self) -> bool:
+        """True if the input has ended."""
+        return self._time > 0.0
+
+    @property
+    def seconds(self) -> float:
+        """Time since the end [s]; 0 before."""
+        return time.monotonic() - self._time if self._time else 0.0
+
+
+if __name__ == "__main__":
+    if hasattr(os, "nice") and sys.argv[1] != LIVE:  # A window must answer its user.
+        os.nice(NICE)
+    main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]), float(sys.argv[4]))
