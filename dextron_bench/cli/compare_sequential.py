@@ -50,9 +50,12 @@ def compare(command: Compare, split: Split) -> int:
 
 def _play(sides: list[ScoresInOrder], rows: int, report: Progress) -> Outcome:
     """Plays one row after another, until the returns decide or all rows are played."""
+    import numpy as np
+
     from dextron_bench.scores import sequential
     from dextron_bench.world import task
 
+    a = b = returns = np.zeros((1, 0))
     for count in range(1, rows + 1):
         a, b = (side.first(count) for side in sides)
         returns = b.mean(axis=0) - a.mean(axis=0)

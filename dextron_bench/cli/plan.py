@@ -59,10 +59,10 @@ class Plan:
             raise BadPlan("--difference must be above 0, and --seeds at least 2: one seed does not show their spread")
         results = result_files.find(self.a, self.runs), result_files.find(self.b, self.runs)
         a, b = comparison.align((self.a, self.b), results, self.split, self.reaches)
-        scores = [100.0 * (one.scores == task.SUCCESS) if self.measure == "success" else one.scores for one in (a, b)]
-        noise = planning.noise(*scores)
+        one, other = (100.0 * (x.scores == task.SUCCESS) if self.measure == "success" else x.scores for x in (a, b))
+        noise = planning.noise(one, other)
         plans = planning.plans(noise, self.difference, self.seeds)
-        present = paired.difference(*scores).detectable
+        present = paired.difference(one, other).detectable
         if self.json:
             print_json({"noise": asdict(noise), "present": present, "plans": [asdict(plan) for plan in plans]})
             return DONE

@@ -72,7 +72,10 @@ class TrainingView:
             self._stream.send_chunks(self._episode(seed, begin, title, episode))
             begin += len(episode.states)
         self._ends[seed] = begin
-        self._loop = (min(first, self._loop[0]), max(begin, self._loop[1])) if self._shares(first) else (first, begin)
+        if self._loop is not None and self._shares(first):
+            self._loop = (min(first, self._loop[0]), max(begin, self._loop[1]))
+        else:
+            self._loop = (first, begin)
         self._arrange()
 
     def close(self) -> None:
@@ -135,7 +138,7 @@ def _with_loop(content: rrb.Container, loop: tuple[int, int] | None) -> rrb.Blue
             fps=50.0,
             play_state="playing",
             loop_mode="selection",
-            time_selection=selection,
+            time_selection=selection,  # pyright: ignore[reportArgumentType]
             state="collapsed",
         ),
         rrb.SelectionPanel(state="hidden"),

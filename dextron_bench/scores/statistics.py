@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from scipy.optimize import brentq
@@ -100,7 +101,8 @@ def p_value(mean: float, parts: Sequence[Part]) -> float:
         return 1.0
     if half_width(parts, SMALLEST) <= size:
         return 0.0
-    return math.exp(brentq(lambda log: half_width(parts, math.exp(log)) - size, math.log(SMALLEST), 0.0))
+    root = brentq(lambda log: half_width(parts, math.exp(log)) - size, math.log(SMALLEST), 0.0)
+    return math.exp(cast(float, root))
 
 
 def draw_counts(size: int, rng: np.random.Generator) -> np.ndarray:

@@ -104,8 +104,8 @@ class _Attempt:
         return replace(
             trial,
             state=DONE,
-            returns=statistics.estimate(scores, np.random.default_rng(0)),
-            successes=statistics.estimate((scores == task.SUCCESS).astype(float), np.random.default_rng(0)),
+            returns=statistics.estimate(scores),
+            successes=statistics.estimate((scores == task.SUCCESS).astype(float), statistics.SHARES),
             failed=sum(result["failed"] for result in results),
             points=_mean_curve(self._curves(group)),
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from dextron_bench.recording.training_view import open_training_viewer
 from dextron_bench.tracking.follower import POLL, Counts, Follower
@@ -43,5 +44,7 @@ def watch(
 
 
 def _sum(parts: Sequence[Counts]) -> Counts:
-    numbers = {name: sum(getattr(part, name) for part in parts) for name in ("points", "evaluations", "dropped")}
+    numbers: dict[str, Any] = {
+        name: sum(getattr(part, name) for part in parts) for name in ("points", "evaluations", "dropped")
+    }
     return Counts(**numbers, error=next((part.error for part in parts if part.error), ""))

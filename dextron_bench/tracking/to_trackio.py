@@ -63,6 +63,6 @@ def create(files: TrainingFiles, into: Path) -> TrackioTracker:
     """A tracker that writes into a folder."""
     into.mkdir(parents=True, exist_ok=True)
     os.environ.setdefault("TRACKIO_DIR", str(into))  # Trackio reads it when it is loaded.
-    import trackio
+    import trackio  # pyright: ignore[reportMissingImports]
 
     return TrackioTracker(trackio, files, into)

@@ -17,6 +17,7 @@ from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches.reach import Path
 from dextron_bench.world import model
+from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.engine import Engine, Step
 from tests.benchmarks.measure import Row, scaled, store_rows, time_in_turns, time_work
 from tests.benchmarks.workload import PreparedSource, default_source, draw_cases
@@ -44,9 +45,9 @@ class RecordingEngine(Engine):
 
     tape: Tape
 
-    def begin(self, ids: np.ndarray, paths: Sequence[Path]) -> np.ndarray:
+    def begin(self, ids: np.ndarray, paths: Sequence[Path], bottles: Sequence[Bottle] = ()) -> np.ndarray:
         """Like the engine's method, and stores the state rows."""
-        states = super().begin(ids, paths)
+        states = super().begin(ids, paths, bottles)
         self.tape.slots = self.slots
         self.tape.starts.setdefault(len(self.tape.events), []).append((ids.copy(), self._batch.state[ids].copy()))
         return states

@@ -29,6 +29,7 @@ def test_the_parts_of_the_noise_are_recovered():
 def test_one_seed_each_needs_the_settings_of_the_textbook():
     """A standard deviation of 10 and a difference of 1: (2.8 * 10)^2 = 785 settings, and two more for Student's t."""
     [plan] = planning.plans(Noise(100.0, (), ()), 1.0, [3, 5])
+    assert plan.settings
     assert plan == planning.Plan(1, plan.settings, 2 * plan.settings)
     assert plan.settings == pytest.approx(787, abs=2)
 
@@ -38,12 +39,14 @@ def test_no_number_of_settings_replaces_seeds():
     noise = Noise(100.0, (1.0, 1.0), (50.0, 50.0))
     few, many = planning.plans(noise, 1.0, [3, 30])
     assert (few.settings, few.episodes) == (None, None)
+    assert many.settings
     assert many.episodes == 60 * many.settings
     assert planning.detectable(noise, many.settings, 30) <= 1.0 < planning.detectable(noise, many.settings - 1, 30)
 
 
 def test_a_method_with_one_seed_keeps_it():
     [plan] = planning.plans(Noise(100.0, (0.01,), (50.0,)), 1.0, [5])
+    assert plan.settings
     assert plan.episodes == 6 * plan.settings
 
 
@@ -52,6 +55,7 @@ def test_a_planned_comparison_shows_the_difference_four_times_in_five(seeds: int
     """With this generator, 77 and 87 % of the comparisons show it; the standard error is 2.8 %."""
     noise, rng = Noise(36.0, (0.04, 0.04), (16.0, 16.0)), np.random.default_rng(5)
     [plan] = planning.plans(noise, 1.0, [seeds])
+    assert plan.settings
     shown = []
     for _ in range(200):
         a = scores(rng, 100.0, seeds, np.zeros(plan.settings), (0.2, 4.0))

@@ -51,14 +51,14 @@ def test_wandb_reads_an_offline_run_for_each_seed(tmp_path: Path, monkeypatch: p
     monkeypatch.delenv("WANDB_MODE", raising=False)
     into, returns = write("wandb", tmp_path)
     from wandb.proto import wandb_internal_pb2
-    from wandb.sdk.internal.datastore import DataStore
+    from wandb.sdk.internal.datastore import DataStore  # pyright: ignore[reportMissingImports]
 
     curves: dict[int, dict[int, float]] = {}
     for file in into.rglob("run-*.wandb"):
         store, seed = DataStore(), -1
         store.open_for_scan(str(file))
         while data := store.scan_data():
-            record: Any = wandb_internal_pb2.Record()
+            record: Any = wandb_internal_pb2.Record()  # pyright: ignore[reportAttributeAccessIssue]
             record.ParseFromString(data)
             if record.WhichOneof("record_type") == "run" and seed < 0:
                 seed = int(record.run.display_name.rpartition("seed")[2])
@@ -74,7 +74,7 @@ def test_wandb_reads_an_offline_run_for_each_seed(tmp_path: Path, monkeypatch: p
 
 def test_trackio_reads_a_run_for_each_seed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("trackio")
-    from trackio import sqlite_storage, utils
+    from trackio import sqlite_storage, utils  # pyright: ignore[reportMissingImports]
 
     monkeypatch.setattr(sqlite_storage, "TRACKIO_DIR", tmp_path / "database")
     monkeypatch.setattr(utils, "TRACKIO_DIR", tmp_path / "database")
