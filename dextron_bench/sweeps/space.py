@@ -59,7 +59,7 @@ class Range:
     def draw(self, rng: np.random.Generator) -> float:
         """A number of the range."""
         if self.is_whole and not self.log:
-            return int(rng.integers(self.low, self.high, endpoint=True))
+            return int(rng.integers(int(self.low), int(self.high), endpoint=True))
         low, high = (self.low - 0.5, self.high + 0.5) if self.is_whole else (self.low, self.high)
         number = float(np.exp(rng.uniform(np.log(low), np.log(high)))) if self.log else float(rng.uniform(low, high))
         number = min(max(number, self.low), self.high)  # Rounding may leave the range.

@@ -50,10 +50,8 @@ class Trial:
         val = content["val"]
         returns, successes = (Estimate(**val[name]) if name in val else None for name in ("return", "success"))
         points = {point["epoch"]: point["return"] for point in content["points"]}
-        return cls(
-            *(content[name] for name in ("settings", "run", "state")),
-            returns, successes, val["failed"], points, content["error"],
-        )  # fmt: skip
+        about = {name: content[name] for name in ("settings", "run", "state", "error")}
+        return cls(**about, returns=returns, successes=successes, failed=val["failed"], points=points)
 
 
 def best(trials: Sequence[Trial]) -> int | None:

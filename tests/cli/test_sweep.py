@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -183,6 +184,19 @@ def test_a_class_that_is_no_dataclass_has_flags_too(here: Path, monkeypatch: pyt
     monkeypatch.syspath_prepend(here)
     assert main.main(sweep("--grid", f"near={SOLVES},0.95", method="plain.py:Plain")) == 0
     assert content()["winner"]["run"] == "plain-near0.224264/synthetic"
+
+
+def test_the_story_of_the_docs_runs_as_written(here: Path, capsys: pytest.CaptureFixture[str]):
+    page = (Path(__file__).parents[2] / "docs/sweeps.md").read_text()
+    story = page.partition("## A story")[2].partition("## What to vary")[0]
+    commands = [line for line in story.splitlines() if line.startswith("dextron-bench ")]
+    assert len(commands) == 6
+    for command in commands:
+        assert main.main(shlex.split(command)[1:]) == 0
+    assert "winner: my-agent" in capsys.readouterr().out
+    assert [trial["run"] for trial in content()["trials"]] == [
+        "my-agent/synthetic", "my-agent-near0.15/synthetic", "my-agent-near0.18/synthetic"
+    ]  # fmt: skip
 
 
 def test_a_name_belongs_to_one_question_and_one_process(here: Path, capsys: pytest.CaptureFixture[str]):
