@@ -82,6 +82,8 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
 
     Writes nothing outside the folder. Checks names, sizes and hashes before it parses the content of any file.
     """
+    if file.exists() and not file.is_file():  # Opening a pipe would wait for whoever writes into it.
+        raise BadBundle(f"{file} is not a regular file")
     try:
         _check_directory(file)
         with zipfile.ZipFile(file) as archive:

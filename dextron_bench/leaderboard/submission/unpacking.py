@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from dextron_bench.leaderboard.submission import bundle, entry, episode_tables
 from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import hashing
-from dextron_bench.storage.run_folder import seed_folders
+from dextron_bench.storage.run_folder import RunFolder, seed_folders
 
 FOLDER = Path(entry.FOLDER, ".bundles")  # In the folder of runs; not a valid name of a submission.
 
@@ -28,6 +28,11 @@ def unpack_for_viewing(file: Path, runs: Path) -> Path:
     with TemporaryDirectory(prefix=".unpacking-", dir=place.parent) as folder:
         part = Path(folder) / "bundle"
         manifest = bundle.unpack(file, part)
+        for table in (RunFolder.of_seed(part, seed).episodes for seed in manifest["seeds"]):
+            if not table.exists():
+                raise bundle.BadBundle(
+                    f"{file} lacks {table.relative_to(part)}; make it again with `dextron-bench submit`"
+                )
         splits = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
         for run in seed_folders(part):
             for fault in episode_tables.faults(episode_tables.read(run.episodes, splits), splits):

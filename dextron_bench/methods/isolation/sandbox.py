@@ -8,6 +8,7 @@ this package's code, since the user has chosen to install it.
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -81,8 +82,9 @@ def _bubblewrap(scratch: str, readable: Sequence[str], disk: int, public: Sequen
     hidden = _hidden(package) if public else [place for place in secrets if place.is_dir()]
     command = ["bwrap", *_namespaces(), "--die-with-parent", "--new-session", "--proc", "/proc", "--dev", "/dev"]
     command += ["--tmpfs", "/tmp"]
-    for path in folders if public else [*folders, str(package)]:
-        command += ["--ro-bind-try", path, path]
+    folders = list(dict.fromkeys(folders if public else [*folders, str(package)]))
+    for path in folders:
+        command += _bind(path, [other for other in folders if other != path])
     for folder in hidden:
         command += ["--tmpfs", str(folder)]
     for file in [*map(str, public), *(path for path in readable if Path(path).is_file())]:
@@ -93,6 +95,18 @@ def _bubblewrap(scratch: str, readable: Sequence[str], disk: int, public: Sequen
     for folder in (*hidden, "/tmp", "/dev", "/"):
         command += ["--remount-ro", str(folder)]
     return [*command, "--"]
+
+
+def _bind(folder: str, others: Sequence[str]) -> list[str]:
+    """Options for a folder that the agent may read. A link into one of the others stays a link.
+
+    A second copy of its target would show what is hidden in the first one; `lib64` of an environment is such a link.
+    """
+    target = os.path.realpath(folder)
+    if not os.path.islink(folder) or not any(Path(target).is_relative_to(other) for other in others):
+        return ["--ro-bind-try", folder, folder]
+    is_there = any(Path(folder).is_relative_to(other) for other in others)
+    return [] if is_there else ["--symlink", target, folder]
 
 
 def _scratch(folder: str, size: int) -> list[str]:

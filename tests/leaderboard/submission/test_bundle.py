@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import stat
 import warnings
@@ -182,6 +183,12 @@ def test_a_check_of_json_that_takes_too_long_is_refused(monkeypatch: pytest.Monk
     monkeypatch.setattr(bundle, "SECONDS", 3.0)
     with pytest.raises(bundle.BadBundle, match="the process that read it took too long"):
         bundle.parse(b'{"seeds": [' + b"0," * 1_900_000 + b"0]}", "bundle", Path("mine.json"))
+
+
+def test_a_pipe_is_refused_at_once(tmp_path: Path):
+    os.mkfifo(tmp_path / "pipe.zip")
+    with pytest.raises(bundle.BadBundle, match=r"pipe\.zip is not a regular file"):
+        bundle.unpack(tmp_path / "pipe.zip", tmp_path / "opened")
 
 
 @pytest.mark.parametrize(("place", "number"), [(12, 1_000_000), (16, 2**31), (16, 60)])

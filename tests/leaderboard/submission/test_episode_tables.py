@@ -25,7 +25,7 @@ from tests.helpers.forged_bundles import Forgery, row
         (row(1, actions=None), "without its actions"),
         (row(1, final=[0.0] * 47), "a last state without exactly 48 numbers"),
         (row(1, failure="x" * 2_000_000), "has texts of 20000"),
-        (row(1, failure="\x1b]0;mine\x07"), r"has the character '\x07' in column 'failure'"),
+        (row(1, failure="\x1b]0;mine\x07"), r"has the character '\x1b' in column 'failure'"),
         (lambda table: table.drop(columns="trace"), "it lacks b'trace'"),
         (lambda table: table.drop(columns="score"), "differs in 'score'"),
         (lambda table: table.assign(more=1), "differs in 'more'"),

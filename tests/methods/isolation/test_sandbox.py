@@ -59,6 +59,16 @@ def test_a_project_inside_the_folder_of_python_is_not_in_the_sandbox(
     assert [folder for folder in bound if hidden.is_relative_to(folder)] == []
 
 
+def test_a_link_in_the_folder_of_python_stays_a_link(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A second copy of `lib` would have the simulator, which is hidden in the first one."""
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib64").symlink_to("lib")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    command = sandbox.wrap(["agent"], "/scratch", (), 2**30, 2**20, [Path(sandbox.__file__)])
+    assert command.count(f"{tmp_path}/lib64") == 1
+    assert command[command.index(f"{tmp_path}/lib64") - 2 :][:2] == ["--symlink", str((tmp_path / "lib").resolve())]
+
+
 def test_published_results_in_the_package_are_hidden_from_installed_methods(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
