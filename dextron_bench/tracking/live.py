@@ -43,5 +43,7 @@ def watch(
 
 
 def _sum(parts: Sequence[Counts]) -> Counts:
-    numbers = {name: sum(getattr(part, name) for part in parts) for name in ("points", "evaluations", "dropped")}
-    return Counts(**numbers, error=next((part.error for part in parts if part.error), ""))
+    points, evaluations, dropped = (
+        sum(getattr(part, name) for part in parts) for name in ("points", "evaluations", "dropped")
+    )
+    return Counts(points, evaluations, dropped, next((part.error for part in parts if part.error), ""))
