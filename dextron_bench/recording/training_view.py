@@ -11,7 +11,6 @@ from contextlib import contextmanager
 
 import rerun as rr
 import rerun.blueprint as rrb
-from rerun.blueprint.components import AbsoluteTimeRange
 from rerun.chunk import Chunk
 from rerun.encodings import TimeRange
 from rerun_bindings import flush_and_cleanup_orphaned_recordings
@@ -43,7 +42,6 @@ class TrainingView:
         """`connect` connects a stream to a viewer or to a file; `name` identifies the training."""
         rr.set_strict_mode(True)
         self._seeds, self._names = tuple(seeds), list[str]()
-        self._loop: tuple[int, int] | None = None  # Steps of the newest episodes, first and last.
         self._newest = 0  # Newest step.
         self._end = 0  # Step at which the plots end.
         self._ends = dict.fromkeys(seeds, 0)
@@ -69,13 +67,11 @@ class TrainingView:
         """Adds episodes, which begin at `step` or after the last one that is there; each has a title."""
         if not self._ends[seed]:  # Before its first episode, a seed has no hand.
             self._stream.send_chunks([_below(seed, chunk) for chunk in scene.static_chunks()])
-        first = begin = max(step, self._ends[seed])
+        begin = max(step, self._ends[seed])
         for title, episode in zip(titles, episodes, strict=True):
             self._stream.send_chunks(self._episode(seed, begin, title, episode))
             begin += len(episode.states)
         self._ends[seed] = begin
-        self._is_arranged = False
-        self._loop = (min(first, self._loop[0]), max(begin, self._loop[1])) if self._shares(first) else (first, begin)
 
     def flush(self) -> None:
         """Lays out what is new; apart from this, the viewer keeps the layout, which its user may have changed."""
@@ -87,10 +83,6 @@ class TrainingView:
         self._arrange()
         self._stream.disconnect()
         flush_and_cleanup_orphaned_recordings()
-
-    def _shares(self, first: int) -> bool:
-        """True if episodes that begin at a step are of the same evaluation as the newest ones."""
-        return self._loop is not None and self._loop[0] <= first < self._loop[1]
 
     def _episode(self, seed: int, begin: int, title: str, episode: Episode) -> Iterator[Chunk]:
         for chunk in scene.chunks(episode.states, begin):
@@ -124,7 +116,7 @@ class TrainingView:
         plots = [self._plot(name) for name in order]
         rest = [rrb.Tabs(*plots[FIRST:])] if plots[FIRST:] else []
         content = rrb.Horizontal(rrb.Grid(*columns), rrb.Vertical(*plots[:FIRST], *rest), column_shares=[3, 2])
-        self._stream.send_blueprint(_with_loop(content, self._loop))
+        self._stream.send_blueprint(blueprint.with_time_panel(content, live=True))
         self._is_arranged = True
 
     def _plot(self, name: str) -> rrb.TimeSeriesView:
@@ -143,25 +135,6 @@ class TrainingView:
 def _below(seed: int, chunk: Chunk) -> Chunk:
     """A chunk whose entity is below the root of a seed."""
     return chunk.with_entity_path(f"/seed{seed}{chunk.entity_path}")
-
-
-def _with_loop(content: rrb.Container, loop: tuple[int, int] | None) -> rrb.Blueprint:
-    """A layout whose time line follows the newest step; its play button plays a range of steps in a loop."""
-    return rrb.Blueprint(
-        content,
-        rrb.TimePanel(
-            timeline=STEP,
-            fps=50.0,
-            play_state="following",
-            loop_mode="selection",
-            time_selection=AbsoluteTimeRange(*loop) if loop else None,
-            state="collapsed",
-        ),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
-        auto_views=False,
-        auto_layout=False,
-    )
 
 
 @contextmanager
