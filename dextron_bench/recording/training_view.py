@@ -1,7 +1,7 @@
 """Shows a training in Rerun: its curves, and the newest episodes of each seed.
 
 Curves and episodes share the time line `step`, the control steps of the training: an evaluation's episodes lie at the
-step at which its weights were saved, one after another, and play there in a loop.
+step at which its weights were saved, one after another.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from contextlib import contextmanager
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk
-from rerun.encodings import AbsoluteTimeRange
+from rerun.encodings import TimeRange
 from rerun_bindings import flush_and_cleanup_orphaned_recordings
 
 from dextron_bench.evaluation.episodes import Episode
@@ -29,6 +29,7 @@ TITLES = {  # Titles of the plots that come first, by the name of their values.
     "time/steps_per_second": "Control steps per second of a seed",
     "memory/process_MB": "Memory [MB]",
 }
+AHEAD = 1.25  # Share of the newest step at which the plots end, so that they need no new layout for each epoch.
 FIRST = 3  # Plots that have a place of their own; the others share one as tabs.
 
 Connect = Callable[[rr.RecordingStream], None]
@@ -41,14 +42,11 @@ class TrainingView:
         """`connect` connects a stream to a viewer or to a file; `name` identifies the training."""
         rr.set_strict_mode(True)
         self._seeds, self._names = tuple(seeds), list[str]()
-        self._loop: tuple[int, int] | None = None  # Steps of the newest episodes, first and last.
+        self._newest = 0  # Newest step.
+        self._end = 0  # Step at which the plots end.
         self._ends = dict.fromkeys(seeds, 0)
         self._stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)
         connect(self._stream)
-        static = [*scene.static_chunks()]
-        self._stream.send_chunks(
-            [chunk.with_entity_path(f"/seed{k}{chunk.entity_path}") for k in seeds for chunk in static]
-        )
         self._arrange()
 
     def values(self, seed: int, epoch: int, step: int, values: Mapping[str, float]) -> None:
@@ -62,35 +60,34 @@ class TrainingView:
             self._names += new
             chunks += [self._style(name, k) for name in new for k in self._seeds]
         self._stream.send_chunks(chunks)
-        if new:
-            self._arrange()
+        self._is_arranged &= not new and step < self._end
+        self._newest = max(step, self._newest)
 
     def episodes(self, seed: int, step: int, titles: Sequence[str], episodes: Sequence[Episode]) -> None:
         """Adds episodes, which begin at `step` or after the last one that is there; each has a title."""
-        first = begin = max(step, self._ends[seed])
+        if not self._ends[seed]:  # Before its first episode, a seed has no hand.
+            self._stream.send_chunks([_below(seed, chunk) for chunk in scene.static_chunks()])
+        begin = max(step, self._ends[seed])
         for title, episode in zip(titles, episodes, strict=True):
             self._stream.send_chunks(self._episode(seed, begin, title, episode))
             begin += len(episode.states)
         self._ends[seed] = begin
-        if self._loop is not None and self._shares(first):
-            self._loop = (min(first, self._loop[0]), max(begin, self._loop[1]))
-        else:
-            self._loop = (first, begin)
-        self._arrange()
+
+    def flush(self) -> None:
+        """Lays out what is new; apart from this, the viewer keeps the layout, which its user may have changed."""
+        if not self._is_arranged:
+            self._arrange()
 
     def close(self) -> None:
         """Completes the file, or leaves the viewer."""
+        self._arrange()
         self._stream.disconnect()
         flush_and_cleanup_orphaned_recordings()
-
-    def _shares(self, first: int) -> bool:
-        """True if episodes that begin at a step are of the same evaluation as the newest ones."""
-        return self._loop is not None and self._loop[0] <= first < self._loop[1]
 
     def _episode(self, seed: int, begin: int, title: str, episode: Episode) -> Iterator[Chunk]:
         for chunk in scene.chunks(episode.states, begin):
             if chunk.entity_path != scene.TRACE:  # The whole path of an episode appears at once, below.
-                yield chunk.with_entity_path(f"/seed{seed}{chunk.entity_path}")
+                yield _below(seed, chunk)
         path = rr.LineStrips3D([task.palm_centre(episode.states)], radii=[0.0012], colors=[scene.TRACE_COLOUR])
         times = [rr.TimeColumn(STEP, sequence=[begin])]
         columns = [batch.partition([1]) for batch in path.as_component_batches()]
@@ -109,43 +106,35 @@ class TrainingView:
             rrb.Vertical(
                 blueprint.spatial_view(f"/seed{seed}", f"Seed {seed}: newest episodes"),
                 rrb.TextDocumentView(origin=f"/seed{seed}/card", name=f"Seed {seed}"),
-                row_shares=[5, 1],
+                row_shares=[4, 1],
             )
             for seed in self._seeds
         ]
+        self._end = int(self._newest * AHEAD)
         order = [name for name in TITLES if name in self._names]
         order += [name for name in self._names if name not in TITLES]
         plots = [self._plot(name) for name in order]
         rest = [rrb.Tabs(*plots[FIRST:])] if plots[FIRST:] else []
         content = rrb.Horizontal(rrb.Grid(*columns), rrb.Vertical(*plots[:FIRST], *rest), column_shares=[3, 2])
-        self._stream.send_blueprint(_with_loop(content, self._loop))
+        self._stream.send_blueprint(blueprint.with_time_panel(content, live=True))
+        self._is_arranged = True
 
     def _plot(self, name: str) -> rrb.TimeSeriesView:
         limits = {"val/return": (0.0, 20.0), "train/score": (0.0, 20.0), "val/success": (0.0, 1.0)}.get(name)
         axis = rrb.ScalarAxis(range=limits, zoom_lock=True) if limits else None
-        return rrb.TimeSeriesView(origin=f"/curves/{name}", name=TITLES.get(name, name), axis_y=axis)
+        start, end = rrb.TimeRangeBoundary.absolute(seq=0), rrb.TimeRangeBoundary.absolute(seq=self._end)
+        return rrb.TimeSeriesView(
+            origin=f"/curves/{name}",
+            name=TITLES.get(name, name),
+            axis_x=rrb.archetypes.TimeAxis(view_range=TimeRange(start, end)),
+            axis_y=axis,
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
+        )
 
 
-def _with_loop(content: rrb.Container, loop: tuple[int, int] | None) -> rrb.Blueprint:
-    """A layout whose time line plays a range of steps in a loop in real time, or follows if there is none."""
-    if loop is None:
-        return blueprint.with_time_panel(content, live=True)
-    selection = AbsoluteTimeRange(*loop)
-    return rrb.Blueprint(
-        content,
-        rrb.TimePanel(
-            timeline=STEP,
-            fps=50.0,
-            play_state="playing",
-            loop_mode="selection",
-            time_selection=selection,  # pyright: ignore[reportArgumentType]
-            state="collapsed",
-        ),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
-        auto_views=False,
-        auto_layout=False,
-    )
+def _below(seed: int, chunk: Chunk) -> Chunk:
+    """A chunk whose entity is below the root of a seed."""
+    return chunk.with_entity_path(f"/seed{seed}{chunk.entity_path}")
 
 
 @contextmanager

@@ -70,6 +70,8 @@ class Follower:
         if self._waiting:
             self.counts.evaluations += self._pass_on(self._show, self._waiting.popleft())
             return True
+        if not evaluations:
+            self._pass_on(lambda _: self._tracker.flush(), None)
         return bool(evaluations)
 
     def run(self, is_over: Callable[[], bool], is_late: Callable[[], bool], note: Callable[[Counts], None]) -> None:

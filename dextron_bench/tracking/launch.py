@@ -72,14 +72,23 @@ def following(
         threading.Thread(target=_watch, args=(follower, is_over, say), daemon=True).start()
     try:
         yield
-    finally:
-        is_over.set()
+    except BaseException:  # Nobody waits after an error or Ctrl-C: the trackers end by themselves.
+        _end_inputs(followers, is_over)
         for follower in followers:
-            with suppress(OSError):
-                follower.input.close()
-        deadline = time.monotonic() + grace + MARGIN
-        for follower in followers:
-            say(_outcome(follower, deadline))
+            say(f"tracker {follower.name} shows the rest in {grace:g} s at most; counts: {counts_file(follower.into)}")
+        raise
+    _end_inputs(followers, is_over)
+    deadline = time.monotonic() + grace + MARGIN
+    for follower in followers:
+        say(_outcome(follower, deadline))
+
+
+def _end_inputs(followers: Sequence[_Follower], is_over: threading.Event) -> None:
+    """Lets trackers know that the training is over."""
+    is_over.set()
+    for follower in followers:
+        with suppress(OSError):
+            follower.input.close()
 
 
 def _watch(follower: _Follower, is_over: threading.Event, say: Callable[[str], None]) -> None:

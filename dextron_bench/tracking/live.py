@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from dextron_bench.recording.training_view import open_training_viewer
 from dextron_bench.tracking.follower import POLL, Counts, Follower
@@ -44,7 +43,7 @@ def watch(
 
 
 def _sum(parts: Sequence[Counts]) -> Counts:
-    numbers: dict[str, Any] = {
-        name: sum(getattr(part, name) for part in parts) for name in ("points", "evaluations", "dropped")
-    }
-    return Counts(**numbers, error=next((part.error for part in parts if part.error), ""))
+    points, evaluations, dropped = (
+        sum(getattr(part, name) for part in parts) for name in ("points", "evaluations", "dropped")
+    )
+    return Counts(points, evaluations, dropped, next((part.error for part in parts if part.error), ""))

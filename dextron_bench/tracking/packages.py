@@ -12,9 +12,14 @@ class MissingTracker(ValueError):
 
 def require(names: Sequence[str]) -> None:
     """Raises MissingTracker if the package of a tracker is not installed; imports none of them."""
-    missing = [name for name in names if name != "rerun" and importlib.util.find_spec(name) is None]
+    missing = [name for name in names if name != "rerun" and not _is_installed(name)]
     if missing:
         raise MissingTracker(
             f"--tracker {missing[0]} needs the package of this name: `pip install {missing[0]}`, "
             f"or the extra: `pip install 'dextron-bench[{missing[0]}]'`"
         )
+
+
+def _is_installed(name: str) -> bool:
+    spec = importlib.util.find_spec(name)
+    return spec is not None and spec.origin is not None  # W&B makes folders of its name, which are no packages.

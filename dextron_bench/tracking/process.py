@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 from dextron_bench.tracking import live, trackers
-from dextron_bench.tracking.follower import Counts, Follower
-from dextron_bench.tracking.launch import LIVE, counts_file
+from dextron_bench.tracking.follower import POLL, Counts, Follower
+from dextron_bench.tracking.launch import LIVE, MARGIN, counts_file
 from dextron_bench.tracking.training_files import TrainingFiles
 from dextron_bench.training import loop
 
@@ -26,9 +26,11 @@ def main(name: str, folder: Path, into: Path, grace: float) -> None:
 
     After the training it takes `grace` [s] at most to show the rest.
     """
-    ended = _EndOfInput()
+    ended = _EndOfInput(None if name == LIVE else grace + MARGIN)
     files = TrainingFiles(folder, loop.seeds_of(folder))
     shutil.rmtree(into, ignore_errors=True)  # It is written anew, from the first epoch on: nothing is there twice.
+    while not files.config() and not ended.is_set():  # The training writes it first.
+        time.sleep(POLL)
     try:
         _follow(name, files, into, ended, grace)
     except Exception as error:
@@ -50,9 +52,10 @@ def _follow(name: str, files: TrainingFiles, into: Path, ended: _EndOfInput, gra
 class _EndOfInput(threading.Thread):
     """Notices when the standard input ends."""
 
-    def __init__(self) -> None:
+    def __init__(self, limit: float | None) -> None:
+        """Ends this process `limit` [s] after the input, in case the tracker hangs; None never ends it."""
         super().__init__(daemon=True)
-        self._time = 0.0
+        self._time, self._limit = 0.0, limit
         self.start()
 
     def run(self) -> None:
@@ -60,6 +63,9 @@ class _EndOfInput(threading.Thread):
         while sys.stdin.buffer.read(1):
             pass
         self._time = time.monotonic()
+        if self._limit is not None:
+            time.sleep(self._limit)
+            os._exit(1)
 
     def is_set(self) -> bool:
         """True if the input has ended."""

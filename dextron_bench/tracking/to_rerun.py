@@ -32,6 +32,10 @@ class RerunTracker:
         ]
         self._view.episodes(point.seed, point.step, titles, episodes)
 
+    def flush(self) -> None:
+        """Lays out what is new."""
+        self._view.flush()
+
     def close(self) -> None:
         """Completes the file."""
         self._view.close()

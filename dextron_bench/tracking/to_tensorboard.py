@@ -5,14 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from tensorboard.compat.proto.event_pb2 import Event  # pyright: ignore[reportAttributeAccessIssue]
-from tensorboard.compat.proto.summary_pb2 import Summary  # pyright: ignore[reportAttributeAccessIssue]
+from tensorboard.compat.proto import event_pb2, summary_pb2
 from tensorboard.summary.writer.event_file_writer import EventFileWriter
 
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.tracking import films
 from dextron_bench.tracking.training_files import Point, TrainingFiles
+
+Event: Any = getattr(event_pb2, "Event")  # noqa: B009 (made at run time: type checkers do not know it)
+Summary: Any = getattr(summary_pb2, "Summary")  # noqa: B009
 
 
 class TensorBoardTracker:
@@ -36,16 +39,19 @@ class TensorBoardTracker:
             )
             self._add(point, [Summary.Value(tag=f"val/episode{row}", image=image)])
 
+    def flush(self) -> None:
+        """Writes what is in memory."""
+        for writer in self._writers.values():
+            writer.flush()
+
     def close(self) -> None:
-        """Writes what is still in memory."""
+        """Completes the files."""
         for writer in self._writers.values():
             writer.close()
 
-    def _add(self, point: Point, values: list[Summary.Value]) -> None:
-        writer = self._writers[point.seed]
-        writer.add_event(Event(wall_time=time.time(), step=point.epoch, summary=Summary(value=values)))
-        if values and values[0].tag.startswith("val/"):
-            writer.flush()
+    def _add(self, point: Point, values: list[Any]) -> None:
+        event = Event(wall_time=time.time(), step=point.epoch, summary=Summary(value=values))
+        self._writers[point.seed].add_event(event)
 
 
 def create(files: TrainingFiles, into: Path) -> TensorBoardTracker:

@@ -6,6 +6,7 @@ The database lies with the files of the tracker, or in the folder that TRACKIO_D
 from __future__ import annotations
 
 import contextvars
+import importlib
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -53,6 +54,9 @@ class TrackioTracker:
             videos[f"val/episode{row}"] = self._trackio.Video(str(file))
         self._runs[point.seed].log(videos, step=point.epoch)
 
+    def flush(self) -> None:
+        """Does nothing: the library writes by itself."""
+
     def close(self) -> None:
         """Ends the runs."""
         for run in self._runs.values():
@@ -63,6 +67,6 @@ def create(files: TrainingFiles, into: Path) -> TrackioTracker:
     """A tracker that writes into a folder."""
     into.mkdir(parents=True, exist_ok=True)
     os.environ.setdefault("TRACKIO_DIR", str(into))  # Trackio reads it when it is loaded.
-    import trackio  # pyright: ignore[reportMissingImports]
+    trackio = importlib.import_module("trackio")
 
     return TrackioTracker(trackio, files, into)

@@ -54,6 +54,9 @@ class WandbTracker:
             videos[f"val/episode{row}"] = wandb.Video(str(file), format="gif")
         self._runs[point.seed].log({"epoch": point.epoch, **videos})
 
+    def flush(self) -> None:
+        """Does nothing: the library writes by itself."""
+
     def close(self) -> None:
         """Ends the runs."""
         for run in self._runs.values():

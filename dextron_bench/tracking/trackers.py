@@ -22,6 +22,10 @@ class Tracker(Protocol):
         """Shows a few episodes of an evaluation; `point` has its values."""
         ...
 
+    def flush(self) -> None:
+        """Called when all that the training has written so far was shown."""
+        ...
+
     def close(self) -> None:
         """Completes what was written."""
         ...

@@ -153,7 +153,7 @@ def test_a_policy_plays_live(
     assert main.main(["view", "--live", "--method", "nothing", "--row", "1", "--speed", "0"]) == 0
     assert capsys.readouterr().out == "nothing on row 1 of test: 0 of 20\n"
     assert (here / "live.rrd").stat().st_size > 100_000
-    assert "takes one --method" in complaint("view", "--live")
+    assert "takes the folder of a training, or one --method" in complaint("view", "--live")
     assert "--speed must be a multiple of real time, or 0 for no delay, not -1" in complaint(
         "view", "--live", "--method", "exp", "--speed", "-1"
     )

@@ -65,6 +65,9 @@ class KeepingTracker:
         """Keeps episodes."""
         self.shown.append((point, episodes))
 
+    def flush(self) -> None:
+        """Does nothing."""
+
     def close(self) -> None:
         """Notes the end."""
         self.is_closed = True

@@ -116,3 +116,13 @@ process.main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]), float(sys.argv[4
     into = tmp_path / "runs/toy-0.1/synthetic/tracking-0+3/rerun"
     assert lines == [f"tracker rerun: 16 points and 6 evaluations with episodes in {into}"]
     assert (into / "training.rrd").stat().st_size > 100_000
+
+
+def test_after_an_error_nobody_waits_for_a_tracker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(launch, "COMMAND", (sys.executable, "-c", "import sys; sys.stdin.read()"))
+    lines: list[str] = []
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), launch.following([tmp_path / FOLDER], ["wandb"], lines.append, 500.0):
+        raise KeyboardInterrupt
+    assert time.monotonic() - start < 60.0
+    assert lines[0].startswith("tracker wandb shows the rest in 500 s at most; counts: ")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +15,8 @@ from dextron_bench.tracking import films, packages, trackers
 from dextron_bench.tracking.follower import Counts, Follower
 from tests.helpers import tracked_training
 from tests.helpers.tracked_training import GIF
+
+BLOCK = 32768  # Bytes of a block in a file of W&B.
 
 
 @pytest.fixture(autouse=True)
@@ -50,32 +55,41 @@ def test_tensorboard_reads_curves_and_films(tmp_path: Path):
 def test_wandb_reads_an_offline_run_for_each_seed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.delenv("WANDB_MODE", raising=False)
     into, returns = write("wandb", tmp_path)
-    from wandb.proto import wandb_internal_pb2
-    from wandb.sdk.internal.datastore import DataStore  # pyright: ignore[reportMissingImports]
+    messages: Any = importlib.import_module("wandb.proto.wandb_internal_pb2")
 
     curves: dict[int, dict[int, float]] = {}
     for file in into.rglob("run-*.wandb"):
-        store, seed = DataStore(), -1
-        store.open_for_scan(str(file))
-        while data := store.scan_data():
-            record: Any = wandb_internal_pb2.Record()  # pyright: ignore[reportAttributeAccessIssue]
+        seed = -1
+        for data in wandb_records(file.read_bytes()):
+            record = messages.Record()
             record.ParseFromString(data)
-            if record.WhichOneof("record_type") == "run" and seed < 0:
+            if record.WhichOneof("record_type") == "run":
                 seed = int(record.run.display_name.rpartition("seed")[2])
-            items = {
-                item.key or "/".join(item.nested_key): item.value_json
-                for item in (record.history.item if record.WhichOneof("record_type") == "history" else ())
-            }
+            items = {item.key or "/".join(item.nested_key): item.value_json for item in record.history.item}
             if "val/return" in items:
                 curves.setdefault(seed, {})[int(items["epoch"])] = float(items["val/return"])
     assert curves == {k: {epoch: value for (epoch, seed), value in returns.items() if seed == k} for k in (0, 3)}
     assert len(list(into.rglob("media/videos/**/*.gif"))) == 6
 
 
+def wandb_records(content: bytes) -> Iterator[bytes]:
+    """The records of a run's file, which has the form of LevelDB's logs; W&B reads it in Go alone."""
+    place, record = 7, b""
+    while place < len(content):
+        if (left := BLOCK - place % BLOCK) < 7:
+            place += left
+            continue
+        _, length, kind = struct.unpack("<IHB", content[place : place + 7])
+        record += content[place + 7 : place + 7 + length]
+        place += 7 + length
+        if kind in (1, 4):  # A whole record, or the last part of one.
+            yield record
+            record = b""
+
+
 def test_trackio_reads_a_run_for_each_seed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("trackio")
-    from trackio import sqlite_storage, utils  # pyright: ignore[reportMissingImports]
-
+    sqlite_storage, utils = (importlib.import_module(f"trackio.{name}") for name in ("sqlite_storage", "utils"))
     monkeypatch.setattr(sqlite_storage, "TRACKIO_DIR", tmp_path / "database")
     monkeypatch.setattr(utils, "TRACKIO_DIR", tmp_path / "database")
     _, returns = write("trackio", tmp_path)
