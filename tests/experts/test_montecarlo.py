@@ -67,7 +67,7 @@ def test_rows_are_the_same_at_any_slots_and_threads_and_after_interruptions(tmp_
     pd.testing.assert_frame_equal(search(broken, rows=3), whole)
 
 
-@pytest.mark.parametrize("of", [1, 2, 3])
+@pytest.mark.parametrize("of", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Shares that do not see each other may stop too early; put together, they see what is missing."""
     monkeypatch.setattr(provenance, "collect", lambda physics: {"git": "abc", "physics": physics})
