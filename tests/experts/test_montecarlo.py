@@ -67,7 +67,8 @@ def test_rows_are_the_same_at_any_slots_and_threads_and_after_interruptions(tmp_
     pd.testing.assert_frame_equal(search(broken, rows=3), whole)
 
 
-@pytest.mark.parametrize("of", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("of", [1, 2, 3])
 def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Shares that do not see each other may stop too early; put together, they see what is missing."""
     monkeypatch.setattr(provenance, "collect", lambda physics: {"git": "abc", "physics": physics})
@@ -108,6 +109,7 @@ def test_a_block_of_a_share_that_differs_from_the_stored_one_is_named(tmp_path: 
         search(tmp_path, rows=1)
 
 
+@pytest.mark.slow
 def test_two_machines_are_named_in_the_summary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for text, machine in 3 * [("0/2", "small"), ("1/2", "large")]:  # The first one may stop too early.
         monkeypatch.setattr(provenance, "collect", lambda physics, name=machine: {"machine": {"cpu": name}})
