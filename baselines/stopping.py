@@ -72,8 +72,6 @@ class Stopping:
 class StoppingAgent:
     """Opens until the mean of its networks' outputs is positive at a decision, then closes for good."""
 
-    rows_are_independent = True
-
     def __init__(self, weights: Mapping[str, np.ndarray]) -> None:
         """Takes `mean` and `deviation` (F,) of features, and layers `network.0`, ... and `ramp` of M networks."""
         self._mean, self._deviation, self._ramp = (

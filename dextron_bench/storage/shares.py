@@ -9,6 +9,7 @@ belong to, until a merge has put them together.
 from __future__ import annotations
 
 import itertools
+import json
 import math
 import statistics
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -151,8 +152,8 @@ class Work:
 
 
 def _with_simulator(config: Mapping[str, Any]) -> dict[str, Any]:
-    """A config with the version of MuJoCo, on which the bits of episodes depend."""
-    return {**config, "mujoco": provenance.version_of("mujoco")}
+    """A config as JSON has it, with the version of MuJoCo, on which the bits of episodes depend."""
+    return json.loads(json.dumps({**config, "mujoco": provenance.version_of("mujoco")}))
 
 
 def check_complete(what: str, names: Sequence[str], present: Collection[str]) -> None:

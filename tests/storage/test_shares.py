@@ -40,7 +40,7 @@ def test_a_message_names_the_first_pieces_that_are_missing():
 
 
 def test_a_stamp_holds_what_a_piece_depends_on_and_only_its_own_files_are_removed(tmp_path: Path):
-    work, config = Work(tmp_path, "c0de"), {"physics": "f00", "seed": 3}
+    work, config = Work(tmp_path, "c0de"), {"physics": "f00", "seed": 3, "policies": ("a", "b")}
     outside, inside = tmp_path / "recordings" / "a.rrd", work.file("a", ".bin")
     for file in (outside, inside):
         file.parent.mkdir()

@@ -14,7 +14,7 @@ from tests.helpers.short_reaches import SOURCE
 from tests.helpers.tiny_runs import forbidden
 from tests.success.test_generation import SMALL, TRAIN, file_contents, generate_small
 
-ROWS = 3000  # In about six blocks.
+ROWS = 3000  # In eleven blocks.
 
 
 def generate_share(folder: Path, text: str) -> int:
