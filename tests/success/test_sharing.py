@@ -39,7 +39,7 @@ def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
     with pytest.raises(shares.MissingPieces, match="lacks the blocks from 000000 on: the blocks before have 0 of 3000"):
         sharing.check_complete(tmp_path, SMALL, ROWS)
     generate_share(tmp_path, "1/2")
-    with pytest.raises(shares.MissingPieces, match=r"lacks 4 of \d+ pieces: block 000000, block 000001"):
+    with pytest.raises(shares.MissingPieces, match=r"lacks \d of \d+ pieces: block 000000, block 000001"):
         sharing.check_complete(tmp_path, SMALL, ROWS)
 
 
