@@ -92,6 +92,7 @@ def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: P
     assert not (merged / "pieces").exists()
 
 
+@pytest.mark.slow
 def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
     with pytest.raises(shares.MissingPieces, match=r"lacks the blocks from 000000 on: .* have 0 of 3 rows"):
         montecarlo.check_complete(SMALL, tmp_path, rows=3)
@@ -100,6 +101,7 @@ def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
         montecarlo.check_complete(SMALL, tmp_path, rows=3)
 
 
+@pytest.mark.slow
 def test_a_block_of_a_share_that_differs_from_the_stored_one_is_named(tmp_path: Path):
     search_share(tmp_path, "0/2", rows=1)
     search(tmp_path, rows=1)
@@ -136,6 +138,7 @@ def test_a_search_stops_at_the_first_block_that_reaches_the_rows():
     assert blocks.total(done) == Tally(4, 32, 17, 15)
 
 
+@pytest.mark.slow
 def test_a_search_continues_from_the_kept_rows_of_a_database(tmp_path):
     def kept(draws: pd.DataFrame) -> pd.DataFrame:
         return draws[draws["score"] > blocks.KEPT].astype({"length": int}).reset_index(drop=True)

@@ -14,6 +14,7 @@ from dextron_bench.methods.isolation import sandbox
 from dextron_bench.storage import folders
 
 
+@pytest.mark.slow
 def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
