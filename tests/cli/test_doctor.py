@@ -12,7 +12,8 @@ import pytest
 from dextron_bench.cli import doctor, main
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
-FOR_USERS = ("minari", "video", "onnx", "sweep", "tensorboard", "trackio", "wandb")  # Extras; the others are for developers.
+# Extras; the others are for developers.
+FOR_USERS = ("minari", "video", "onnx", "sweep", "tensorboard", "trackio", "wandb")
 
 
 def names(requirements: list[str]) -> set[str]:
