@@ -88,9 +88,9 @@ def published_beside(new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def find(name: str, runs: Path) -> Results:
-    """The results of one method: by its label in `runs`, else among the published results, else by a path.
+    """The results of one method by its label in `runs` and, for sources that it has not played there, as published.
 
-    A path is a `result.json`, a run's folder, or the folder of a method's runs. Raises UnknownResult, DamagedFile.
+    If neither place has any, the name is a path. A path is a `result.json`, a run's folder, or the folder of a method's runs. Raises UnknownResult, DamagedFile.
     """
     results = [read_result(file) for file in _files(name, runs)]
     if not results:
@@ -104,11 +104,13 @@ def find(name: str, runs: Path) -> Results:
 
 
 def _files(name: str, runs: Path) -> list[Path]:
-    """The files of a method's results, from the first place that has some."""
+    """The files of a method's results."""
     if NAME.fullmatch(name):
-        for folder in (runs, published_results()):
-            if finished_runs := finished(folder, name):
-                return [run.result for run in finished_runs]
+        mine = finished(runs, name)
+        played = {run.path.parent.name for run in mine}  # Sources of reaches.
+        published = [run for run in finished(published_results(), name) if run.path.parent.name not in played]
+        if mine or published:
+            return [run.result for run in [*mine, *published]]
     path = Path(name)
     if path.is_file():
         return [path]

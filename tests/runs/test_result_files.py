@@ -56,6 +56,12 @@ def test_a_label_without_a_run_finds_the_published_results(runs: Path):
     assert described(result_files.find("rl", runs)) == [("rl", "real", 0, 15.0), ("rl", "real", 1, 16.0)]
 
 
+def test_published_results_stand_in_for_sources_that_were_not_played_here(runs: Path):
+    write(runs, "rl", 0, 7.0, "synthetic")
+    expected = [("rl", "synthetic", 0, 7.0), ("rl", "real", 0, 15.0), ("rl", "real", 1, 16.0)]
+    assert described(result_files.find("rl", runs)) == expected
+
+
 def test_a_run_without_a_result_is_not_found(runs: Path):
     (runs / "rl" / "real" / "seed7").mkdir(parents=True)  # The run is not finished.
     assert len(result_files.find("rl", runs)) == 2
