@@ -90,7 +90,8 @@ def published_beside(new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 def find(name: str, runs: Path) -> Results:
     """The results of one method by its label in `runs` and, for sources that it has not played there, as published.
 
-    If neither place has any, the name is a path. A path is a `result.json`, a run's folder, or the folder of a method's runs. Raises UnknownResult, DamagedFile.
+    If neither place has any, the name is a path: a `result.json`, a run's folder, or the folder of a method's runs.
+    Raises UnknownResult, DamagedFile.
     """
     results = [read_result(file) for file in _files(name, runs)]
     if not results:
