@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import wandb
+import wandb  # pyright: ignore[reportMissingImports]  # Of an extra.
 
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.tracking import films
