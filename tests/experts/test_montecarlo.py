@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -23,8 +24,8 @@ from dextron_bench.storage import folder_config, provenance, shares, tables
 from dextron_bench.storage.shares import Share
 from dextron_bench.world.engine import Engine
 from tests.helpers.short_reaches import SOURCE
-from tests.helpers.tiny_runs import forbidden
 
+Blocks = Iterator[tuple[int, pd.DataFrame]]  # Numbers of blocks, and their draws.
 SMALL = Search("brief", seed=3, experts=3, block=4)
 
 
@@ -34,6 +35,23 @@ def search(folder: Path, rows: int, slots: int = 12, threads: int = 1) -> pd.Dat
 
 def search_share(folder: Path, text: str, rows: int = 3) -> int:
     return montecarlo.run_share(SOURCE, SMALL, folder, rows, Engine(12, 1), Share.parse(text))
+
+
+@pytest.fixture
+def quick_episodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outcomes follow from d_c alone, so that tests of shares need no simulation."""
+
+    def played(source: object, engine: object, drawn: Blocks, experts: int) -> Blocks:
+        for number, draws in drawn:
+            yield number, draws.assign(score=np.where(draws["critical"].between(0.2, 0.3), 20.0, 0.5), length=50)
+
+    monkeypatch.setattr(outcomes, "play_blocks", played)
+
+
+def nothing_left(source: object, engine: object, drawn: Blocks, experts: int) -> Blocks:
+    """Takes the place of `outcomes.play_blocks` where no block should be missing."""
+    assert next(drawn, None) is None, "played a block again"
+    yield from ()
 
 
 def test_draws_are_uniform_with_one_expert_in_each_band():
@@ -67,7 +85,7 @@ def test_rows_are_the_same_at_any_slots_and_threads_and_after_interruptions(tmp_
     pd.testing.assert_frame_equal(search(broken, rows=3), whole)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("quick_episodes")
 @pytest.mark.parametrize("of", [1, 2, 3])
 def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Shares that do not see each other may stop too early; put together, they see what is missing."""
@@ -85,14 +103,14 @@ def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: P
         with suppress(shares.MissingPieces):
             montecarlo.check_complete(SMALL, merged, rows=3)
             break
-    monkeypatch.setattr(outcomes, "batches", forbidden)  # A merge plays nothing.
+    monkeypatch.setattr(outcomes, "play_blocks", nothing_left)
     database.save(search(merged, rows=3), SOURCE, SMALL, merged, "experts")
     for name in ("experts.parquet", "experts.json", "search.json"):
         assert (merged / name).read_bytes() == (whole / name).read_bytes()
     assert not (merged / "pieces").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("quick_episodes")
 def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
     with pytest.raises(shares.MissingPieces, match=r"lacks the blocks from 000000 on: .* have 0 of 3 rows"):
         montecarlo.check_complete(SMALL, tmp_path, rows=3)
@@ -101,7 +119,7 @@ def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
         montecarlo.check_complete(SMALL, tmp_path, rows=3)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("quick_episodes")
 def test_a_block_of_a_share_that_differs_from_the_stored_one_is_named(tmp_path: Path):
     search_share(tmp_path, "0/2", rows=1)
     search(tmp_path, rows=1)
@@ -111,7 +129,7 @@ def test_a_block_of_a_share_that_differs_from_the_stored_one_is_named(tmp_path: 
         search(tmp_path, rows=1)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("quick_episodes")
 def test_two_machines_are_named_in_the_summary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for text, machine in 3 * [("0/2", "small"), ("1/2", "large")]:  # The first one may stop too early.
         monkeypatch.setattr(provenance, "collect", lambda physics, name=machine: {"machine": {"cpu": name}})
