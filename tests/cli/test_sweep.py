@@ -183,7 +183,7 @@ def test_a_class_that_is_no_dataclass_has_flags_too(here: Path, monkeypatch: pyt
     (here / "plain.py").write_text(PLAIN)
     monkeypatch.syspath_prepend(here)
     assert main.main(sweep("--grid", f"near={SOLVES},0.95", method="plain.py:Plain")) == 0
-    assert content()["winner"]["run"] == "plain-near0.224264/synthetic"
+    assert content()["winner"]["run"] == f"plain-near{float(SOLVES):g}/synthetic"
 
 
 def test_the_story_of_the_docs_runs_as_written(here: Path, capsys: pytest.CaptureFixture[str]):
