@@ -41,8 +41,6 @@ def chunks(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
         xyzw = quaternions[:, body][:, shapes.XYZW]
         transforms = rr.Transform3D.columns(translation=positions[:, body], quaternion=xyzw)
         yield Chunk.from_columns(_entity(body), times, transforms)
-    for parts in shapes.fingers():
-        yield Chunk.from_columns(parts.entity, times, parts.shape.pose_columns(*parts.poses(positions, quaternions)))
     points = rr.Points3D.columns(positions=np.concatenate(contacts)).partition([len(points) for points in contacts])
     yield Chunk.from_columns(CONTACTS, times, points)
     centre = task.palm_centre(states)
@@ -89,9 +87,7 @@ def _entity(body: int) -> str:
 
 def static_chunks() -> list[Chunk]:
     """What stays constant in the 3D view; equal for all episodes."""
-    contents = {
-        body: [shapes.fixed(kind, geoms) for kind, geoms in kinds.items()] for body, kinds in shapes.bodies().items()
-    }
+    contents = {body: shapes.of_body(geoms) for body, geoms in shapes.bodies().items()}
     chunks = [static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, *contents.pop(0))]
     contents[model.load().body("palm").id].append(
         rr.Points3D([reach.PALM_CENTRE], radii=[0.005], colors=[CENTRE_COLOUR])
@@ -99,5 +95,4 @@ def static_chunks() -> list[Chunk]:
     chunks.append(static(CONTACTS, rr.Points3D.from_fields(radii=[0.004], colors=[CONTACT_COLOUR])))
     chunks.append(static(TRACE, rr.LineStrips3D.from_fields(radii=[0.002], colors=[TRACE_COLOUR])))
     chunks += [static(_entity(body), *parts) for body, parts in contents.items()]
-    chunks += [static(parts.entity, parts.shape.appearance(parts.geoms)) for parts in shapes.fingers()]
     return chunks

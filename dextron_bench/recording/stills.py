@@ -17,7 +17,7 @@ from dextron_bench.world import model
 from dextron_bench.world.rendering import renderer
 
 EXPERT = Expert(gain=2.0, critical=0.15)  # Succeeds on minimum-jerk reaches (Sharif et al., 2020).
-CLOSURES = (0.0, model.HALF_CLOSED, 1.0)
+CLOSURES = (0.0, 0.5, 1.0)
 LAMPS = 24  # A picture is the average over this number of positions of the key light.
 BEFORE_END = 10  # Control steps before the end of the episode; this state is shown.
 CLEAR = (0.0, 5.0, 0.0)  # [m] position of the bottle in pictures of the hand alone.
@@ -50,7 +50,8 @@ def hand_alone(state: np.ndarray, closure: float) -> np.ndarray:
     physics = model.load()
     posed = state.copy()
     posed[model.BOTTLE_POSITION] = CLEAR
+    posed[physics.joint("thumb_base").qposadr] = model.THUMB_OPPOSED
     for digit, joint, closed in zip(model.DIGITS, *model.proximal(), strict=True):
         posed[joint] = closed * closure
-        posed[physics.joint(f"{digit}_distal").qposadr] = closed * closure * physics.equality(digit).data[1]
+        posed[physics.joint(f"{digit}_distal").qposadr] = closed * closure / physics.equality(digit).data[1]
     return posed

@@ -13,8 +13,7 @@ from dextron_bench.reaches.timing import CONTROL_STEP
 
 DIGITS = ("thumb", "index", "middle", "ring", "little")
 STATE = 48  # qpos (25), then qvel (23).
-THUMB_OPPOSED = 1.05  # [rad] constant angle of the thumb's base.
-HALF_CLOSED = 0.5  # Closure of every digit at the start of an episode.
+THUMB_OPPOSED = 1.05  # [rad] commanded angle of the thumb's base.
 REFERENCE_RANGE = 1.57  # [rad] joint range whose velocity command equals the action.
 
 # Indices in a state. A free joint has a position (3) and a quaternion wxyz (4).
@@ -63,16 +62,11 @@ def command_gain() -> np.ndarray:
 
 @cache
 def initial_qpos() -> np.ndarray:
-    """Joint positions (25,) at the start of an episode, without the palm's pose, which the caller sets."""
-    model = load()
-    qpos = model.qpos0.copy()
-    for digit in DIGITS:
-        close = proximal()[1][DIGITS.index(digit)] * HALF_CLOSED
-        coupling = model.equality(digit).data[1]
-        qpos[model.joint(f"{digit}_proximal").qposadr] = close
-        qpos[model.joint(f"{digit}_distal").qposadr] = close * coupling
-    qpos[model.joint("thumb_base").qposadr] = THUMB_OPPOSED
-    return _read_only(qpos)
+    """Joint positions (25,) at the start of an episode, without the palm's pose, which the caller sets.
+
+    Only the proximal joints are set, to half of their range; the couplings then pull each digit open by about a third.
+    """
+    return _read_only(load().key("start").qpos.copy())
 
 
 @cache

@@ -73,10 +73,15 @@ def test_nothing_sends_zeros_and_random_sends_uniform_noise():
     assert noise.max() > 0.99
 
 
-def test_reflex_closes_within_its_distance_and_opens_beyond():
-    batch = states(1)
-    far = float(task.distance(batch)[0])
-    assert Reflex(near=far).agent(0).act(batch)[0, 0] == 1.0
-    assert Reflex(near=0.99 * far).agent(0).act(batch)[0, 0] == -1.0
+def test_reflex_closes_from_its_distance_on_and_does_not_reopen():
+    near, away = states(2), states(2)  # The first row at 0.1 m from the bottle in x, the second further.
+    far = float(task.distance(near)[0])
+    away[:, 7] -= 0.5
+    agent = Reflex(near=far).agent(0)
+    agent.reset(np.arange(2))
+    played = [agent.act(batch)[:, 0].tolist() for batch in (away, near, away)]
+    assert played == [[-1.0, -1.0], [1.0, -1.0], [1.0, -1.0]]
+    agent.reset(np.array([0]))
+    assert agent.act(away)[0, 0] == -1.0
     with pytest.raises(BadDistance, match="0 or more"):
         Reflex(near=float("nan"))

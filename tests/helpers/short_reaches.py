@@ -40,7 +40,7 @@ SETTINGS = (
     Setting("a", 0.03, 0.04, 0.2),
 )
 TORN, TORN_POSE = Setting("a", *GRASP, 0.3), 30  # A setting whose path has no number at that pose.
-CLOSING = (56, 76, 50, 59, 20)  # Control step from which the fingers close, for each setting.
+CLOSING = (56, 76, 50, 88, 20)  # Control step from which the fingers close, for each setting.
 
 
 class TornSource(ReachSource):

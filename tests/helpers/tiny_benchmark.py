@@ -19,8 +19,8 @@ from tests.helpers.short_reaches import SOURCE
 NAME = "synthetic"  # The name of the source; the command line accepts it.
 COLUMNS = ["split", "reach", "offset_x", "offset_y", "duration_noise", "gain", "critical", "window"]
 SOLVED = (  # From a search; each expert scores 20.
-    ("b", -0.0432621503294626, -0.01466825592348343, 0.4574125439673816, 1.4146469215542943, 0.16870179317709627, 0.1),
-    ("a", -0.0256286214908538, -0.0306174763715841, 1.5043816401333401, 1.4684286438473184, 0.2672967412483991, 0.1),
+    ("b", -0.0321889692488226, -0.009330561323649136, 0.8723991971151619, 1.4573334860056075, 0.2244222635564128, 0.1),
+    ("a", -0.024768541718822548, -0.02119268710746776, 0.63213533472851, 1.211950160077924, 0.2662680106143978, 0.1),
 )
 FALLS = ("b", 0.02, 0.06, -0.4, 1.2, 0.5, 0.0)  # The hand knocks the bottle over after 40 steps.
 ROWS = pd.DataFrame(

@@ -7,11 +7,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pyarrow as pa
+import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench import recording
 from dextron_bench.recording import scene, shapes
-from dextron_bench.world import model, task
+from dextron_bench.world import hulls, model, task
 from dextron_bench.world.rendering import visuals
 from tests.recording.test_episode_file import PATH, episode
 
@@ -24,18 +25,13 @@ def test_poses_contacts_and_signals_are_read_back(tmp_path: Path) -> None:
     moving = [chunk for chunk in RrdReader(file).store().stream().to_chunks() if not chunk.is_static]
     written = {(chunk.entity_path, name): column for chunk in moving for name, column in columns(chunk).items()}
     positions, quaternions, contacts = scene.poses(played.states)
-    for body, entity in ((model.load().body(name).id, f"/world/{name}") for name in ("palm", "bottle")):
+    names = ("palm", "bottle", *(f"{digit}_distal" for digit in model.DIGITS))
+    for body, entity in ((model.load().body(name).id, f"/world/{name}") for name in names):
         np.testing.assert_array_equal(written[entity, "Transform3D:translation"], positions[:, body].astype(np.float32))
         xyzw = quaternions[:, body][:, [1, 2, 3, 0]].astype(np.float32)
         np.testing.assert_array_equal(written[entity, "Transform3D:quaternion"], xyzw)
     points = np.concatenate(contacts).astype(np.float32)
     np.testing.assert_array_equal(written[scene.CONTACTS, "Points3D:positions"].reshape(-1, 3), points)
-    for parts in shapes.fingers():
-        shape, entity = parts.shape, f"/world/fingers/{parts.shape.name}"
-        origins, rotations = (array.astype(np.float32) for array in parts.poses(positions, quaternions))
-        name = shape.archetype.__name__
-        np.testing.assert_array_equal(written[entity, f"{name}:{shape.position_field}"], origins.reshape(-1, 3))
-        np.testing.assert_array_equal(written[entity, f"{name}:quaternions"], rotations.reshape(-1, 4)[:, [1, 2, 3, 0]])
     centre = task.palm_centre(played.states)
     segments = np.stack([centre[:-1], centre[1:]], axis=1).reshape(-1, 3)
     np.testing.assert_array_equal(written[scene.TRACE, "LineStrips3D:strips"], segments.astype(np.float32))
@@ -57,24 +53,30 @@ def columns(chunk: Chunk) -> dict[str, np.ndarray]:
     return numbers
 
 
-def test_the_shapes_of_the_fingers_have_the_poses_of_the_physics() -> None:
-    """All 27 have MuJoCo's poses. Rerun's capsules go from their origin along +z, MuJoCo's are centred on it."""
-    played, drawn = episode(1), visuals.visual_model()
-    data = mujoco.MjData(drawn)
-    data.qpos[:] = played.states[1, : drawn.nq]
-    mujoco.mj_kinematics(drawn, data)
-    positions, quaternions, _ = scene.poses(played.states)
-    count = 0
-    for parts in shapes.fingers():
-        geoms = parts.geoms
-        origins, rotations = (array[1] for array in parts.poses(positions, quaternions))
-        w, x, y, z = rotations.T
-        z_axis = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
-        np.testing.assert_allclose(z_axis, data.geom_xmat[geoms].reshape(-1, 3, 3)[:, :, 2], atol=1e-12)
-        half = drawn.geom_size[geoms, 1:2] * (parts.shape.name == "capsules")
-        np.testing.assert_allclose(origins + half * z_axis, data.geom_xpos[geoms], atol=1e-12)
-        count += len(geoms)
-    assert count == 27
+def test_the_meshes_of_a_body_have_the_corners_of_the_physics() -> None:
+    """The extremes of the first mesh that is drawn for a finger part equal its collision shape, in its frame."""
+    drawn = visuals.visual_model()
+    for name in ("index_proximal", "thumb_distal", "palm"):
+        geom = drawn.geom(name).id
+        assert geom in shapes.bodies()[drawn.geom_bodyid[geom]]
+        discs = hulls.table().query("part == @name")
+        expected, actual = hulls.vertices(discs), visuals.mesh_vertices(drawn, geom)
+        np.testing.assert_allclose(actual.min(axis=0), expected.min(axis=0), atol=1e-6)
+        np.testing.assert_allclose(actual.max(axis=0), expected.max(axis=0), atol=1e-6)
+
+
+def test_all_meshes_of_a_body_become_one_mesh_and_its_cylinders_stay() -> None:
+    """A fingertip has a shell, a pad and a hinge; vertices and triangles of the meshes add up."""
+    drawn = visuals.visual_model()
+    geoms = shapes.bodies()[drawn.body("index_distal").id]
+    mesh, cylinders = shapes.of_body(geoms)
+    meshes = drawn.geom_dataid[geoms[drawn.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_MESH]]
+    assert len(meshes) == 2
+    contents = {batch.component_descriptor().component: batch for batch in mesh.as_component_batches()}
+    counts = {name.split(":")[-1]: len(batch.as_arrow_array()) for name, batch in contents.items()}
+    assert counts["vertex_positions"] == counts["vertex_normals"] == drawn.mesh_vertnum[meshes].sum()
+    assert counts["triangle_indices"] == drawn.mesh_facenum[meshes].sum()
+    assert isinstance(cylinders, rr.Cylinders3D)
 
 
 def test_bodies_have_the_poses_of_the_states() -> None:

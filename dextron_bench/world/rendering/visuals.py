@@ -1,7 +1,7 @@
 """The visual model: the physics model with detailed surfaces, for pictures. It is never stepped, and no score uses it.
 
-The physics shapes are hidden, except the capsules of the digits. Visual shapes of the same size replace them, so that
-contacts look right.
+The collision shapes of the hand are shown as they are, so that contacts look right, with hinges, pads, a wrist and a
+cuff. Visual shapes of the same size replace the bottle and the table.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from functools import cache
 import mujoco
 import numpy as np
 
+from dextron_bench.reaches import rotation
 from dextron_bench.world import model
 from dextron_bench.world.rendering.meshes import Mesh, Section, loft
 
@@ -27,6 +28,9 @@ COLOURS = {  # RGB, specular and shininess of each material.
 SHOWN, HIDDEN = 1, 3  # Groups of geoms.
 VISUAL_ONLY = {"contype": 0, "conaffinity": 0, "mass": 0, "group": SHOWN}
 CUFF = -0.10  # [m] y of the end of the cuff in the palm's frame.
+UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
+HINGE_RADIUS, HINGE_MARGIN = 0.0042, 0.0006  # [m] radius of a hinge, and how far it stands out at each side.
+PAD_START, PAD_SCALE, PAD_RISE = 0.35, 0.85, 0.0009  # Of the length; of the size; [m].
 
 
 class _ShapeAdder:
@@ -36,25 +40,29 @@ class _ShapeAdder:
         self.spec = spec
         self._meshes = 0
 
+    def show(self, geom: str) -> None:
+        """Shows a collision shape of the hand."""
+        shape = self.spec.geom(geom)
+        shape.group, shape.material = SHOWN, "shell"
+
     def mesh(self, body: str, material: str, mesh: Mesh, pos: np.ndarray, quat: np.ndarray) -> None:
         """Adds a closed surface, given in the body's frame."""
-        name = f"shell_{self._meshes}"
-        self._meshes += 1
-        self.spec.add_mesh(
-            name=name,
-            uservert=mesh.vertices.ravel(),
-            userface=mesh.faces.ravel(),
-            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-        )
-        self._add(body, material, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, pos=pos, quat=quat)
+        faces = {"userface": mesh.faces.ravel(), "inertia": mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL}
+        self._add_mesh(body, material, pos, quat, uservert=mesh.vertices.ravel(), **faces)
+
+    def hull(self, body: str, material: str, vertices: np.ndarray) -> None:
+        """Adds the convex hull of vertices (n, 3) in the body's frame."""
+        self._add_mesh(body, material, np.zeros(3), UNTURNED, uservert=vertices.ravel())
 
     def cylinder(self, body: str, material: str, radius: float, ends: np.ndarray) -> None:
         """Adds a cylinder of a radius [m] between two points [m] (2, 3)."""
         self._add(body, material, type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[radius, 0, 0], fromto=ends.ravel())
 
-    def ellipsoid(self, body: str, material: str, size: np.ndarray, pos: np.ndarray, quat: np.ndarray) -> None:
-        """Adds an ellipsoid with half axes `size` [m]."""
-        self._add(body, material, type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=size, pos=pos, quat=quat)
+    def _add_mesh(self, body: str, material: str, pos: np.ndarray, quat: np.ndarray, **content: object) -> None:
+        name = f"shell_{self._meshes}"
+        self._meshes += 1
+        self.spec.add_mesh(name=name, **content)
+        self._add(body, material, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, pos=pos, quat=quat)
 
     def _add(self, body: str, material: str, **shape: object) -> None:
         self.spec.body(body).add_geom(material=material, **VISUAL_ONLY, **shape)
@@ -136,23 +144,13 @@ def _add_bottle(shapes: _ShapeAdder) -> None:
         shapes.cylinder("bottle", "cap", 0.0255, np.array([[0, 0, z], [0, 0, z + 0.003]]))
 
 
-def _add_palm(shapes: _ShapeAdder) -> None:  # Long because it is a list of sections.
-    """Adds the back of the hand, the thenar, the wrist and the cuff, lofted along the palm's y."""
+def _add_palm(shapes: _ShapeAdder) -> None:
+    """Shows the palm's collision shape, and adds the wrist and the cuff, lofted along the palm's y."""
+    shapes.show("palm")
     # A section's x is the palm's x, and a section's y is the palm's -z.
     along_y = _frame_quaternion(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]))
     origin = np.zeros(3)
-    hand = [
-        Section(0.006, 0.0235, 0.0170, -0.003, 0.0),
-        Section(0.022, 0.0285, 0.0180, -0.004, 0.0),
-        Section(0.050, 0.0350, 0.0175, -0.004, 0.0),
-        Section(0.080, 0.0400, 0.0160, -0.004, 0.0005),
-        Section(0.096, 0.0410, 0.0135, -0.004, 0.001),
-    ]
-    shapes.mesh("palm", "shell", loft(hand, 2.8, (0.008, 0.012)), origin, along_y)
-    inside = [Section(0.030, 0.020, 0.004, -0.004, -0.0160), Section(0.060, 0.027, 0.005, -0.004, -0.0155)]
-    inside += [Section(0.090, 0.032, 0.004, -0.004, -0.0125)]
-    shapes.mesh("palm", "pad", loft(inside, 2.4, (0.008, 0.006)), origin, along_y)
-    wrist = [Section(-0.014, 0.0225, 0.0165, -0.003), Section(0.002, 0.0225, 0.0165, -0.003)]
+    wrist = [Section(-0.014, 0.0225, 0.0165, -0.003), Section(0.006, 0.0205, 0.0155, -0.002)]
     shapes.mesh("palm", "joint", loft(wrist, 2.2), origin, along_y)
     ring = [Section(-0.021, 0.0265, 0.0215, -0.003), Section(-0.014, 0.0265, 0.0215, -0.003)]
     shapes.mesh("palm", "accent", loft(ring, 2.1, (0.001, 0.001)), origin, along_y)
@@ -167,18 +165,37 @@ def _add_palm(shapes: _ShapeAdder) -> None:  # Long because it is a list of sect
 
 
 def _add_digit_part(shapes: _ShapeAdder, name: str) -> None:
-    """Shows the physics capsule of one part of a digit, and adds a hinge and, on the inside of a tip, a soft pad."""
-    physics = model.load().geom(name)
-    radius, half = physics.size[:2]
-    capsule = shapes.spec.geom(name)
-    capsule.group, capsule.material = SHOWN, "shell"
-    hinge = np.array([0.0, 0.0, 1.0])
-    shapes.cylinder(name, "joint", radius * 0.95, np.array([-hinge, hinge]) * radius * 1.12)
+    """Shows the collision shape of one part of a digit, and adds a hinge and, on the inside of a tip, a soft pad."""
+    shapes.show(name)
+    physics = model.load()
+    vertices = mesh_vertices(physics, physics.geom(name).id)
+    nearest = np.argmin(np.linalg.norm(vertices[:, :2], axis=1))
+    half = abs(vertices[nearest, 2]) + HINGE_MARGIN
+    shapes.cylinder(name, "joint", HINGE_RADIUS, np.array([[0, 0, -half], [0, 0, half]]))
     if name.endswith("distal"):
-        axis = -_matrix(physics.quat)[:, 2]  # MuJoCo's capsules point from `to` to `from`.
-        inside = np.cross(hinge, axis) * (-1 if name.startswith("thumb") else 1)
-        pad = physics.pos + axis * half * 0.55 + inside * radius * 0.38
-        shapes.ellipsoid(name, "pad", np.array([0.78, 0.78, 1.5]) * radius, pad, _frame_quaternion(hinge, axis))
+        shapes.hull(name, "pad", _pad(vertices, inside=-1.0 if name.startswith("thumb") else 1.0))
+
+
+def _pad(vertices: np.ndarray, inside: float) -> np.ndarray:
+    """The corners (n, 3) of a pad on a fingertip with these vertices (n, 3): the inside of its outer half, moved out.
+
+    `inside` is 1 if a positive rotation about z closes the digit, and -1 otherwise.
+    """
+    tip = vertices[np.argmax(np.linalg.norm(vertices[:, :2], axis=1))] * [1.0, 1.0, 0.0]
+    along = tip / np.linalg.norm(tip)
+    inward = np.cross([0.0, 0.0, inside], along)
+    length, depth = vertices @ along, vertices @ inward
+    outer = length > PAD_START * length.max()
+    patch = vertices[outer & (depth > np.median(depth[outer]))]
+    return patch.mean(axis=0) + PAD_SCALE * (patch - patch.mean(axis=0)) + PAD_RISE * inward
+
+
+def mesh_vertices(compiled: mujoco.MjModel, geom: int) -> np.ndarray:
+    """The vertices (n, 3) [m] of a geom's mesh, in the frame of the geom's body."""
+    mesh = compiled.geom_dataid[geom]
+    vertices = compiled.mesh_vert[compiled.mesh_vertadr[mesh] :][: compiled.mesh_vertnum[mesh]]
+    turn = np.broadcast_to(compiled.geom_quat[geom], (len(vertices), 4))
+    return compiled.geom_pos[geom] + rotation.rotate(turn, vertices)
 
 
 def _frame_quaternion(x: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -189,10 +206,3 @@ def _frame_quaternion(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, np.stack([x, np.cross(z, x), z], axis=1).ravel())
     return quat
-
-
-def _matrix(quat: np.ndarray) -> np.ndarray:
-    """Rotation matrix (3, 3) of a quaternion (4,)."""
-    matrix = np.empty(9)
-    mujoco.mju_quat2Mat(matrix, quat)
-    return matrix.reshape(3, 3)
