@@ -64,6 +64,11 @@ def _run(label: str, method: str, reaches: str, seeds: str = "0", needs: tuple[s
     return Step(name, (command,), (f"{DATA}/splits-{reaches}.parquet", *needs), publishes=(name,))
 
 
+def _quick(label: str, flags: str, reaches: str, seeds: str = "0", needs: tuple[str, ...] = ()) -> Step:
+    """A run with a fifth of the paper's budget."""
+    return _run(f"{label}-quick", f"{flags} --preset quick", reaches, seeds, needs)
+
+
 def _experts(reaches: str, subjects: str = "") -> Step:
     """EXP on every split: it shows which rows have an expert that scores 20."""
     splits = f"train val test unseen-reach {subjects} hard open"
@@ -83,11 +88,12 @@ LEARNERS = {  # By label: the flags of the method.
 }
 RULES = ("reflex", "nothing", "random")
 SIM = f"{WEIGHTS}/sim-0.1/minjerk/*"
+SIM_QUICK = f"{WEIGHTS}/sim-0.1-quick/minjerk/*"
 
 
 def _success(reaches: str, rows: int, epochs: int) -> Step:
-    """The success model, trained on episodes of the experts and of the policies of the full budget."""
-    policies = [f"{WEIGHTS}/{label}/{reaches}/*.safetensors" for label in ("rlil-0.1", "rlil-0.3")]
+    """The success model, trained on episodes of the experts and of policies of a fifth of the budget."""
+    policies = [f"{WEIGHTS}/{label}/{reaches}/*.safetensors" for label in ("rlil-0.1-quick", "rlil-0.3-quick")]
     data = f"success data --reaches {reaches} --rows {rows} --policies {' '.join(policies)} --runs {{runs}}"
     train = f"success train --reaches {reaches} --epochs {epochs} --runs {{runs}}"
     copies = ((f"success/{reaches}/seed0/model.safetensors", f"{DATA}/success-{reaches}.safetensors"),)
@@ -95,7 +101,7 @@ def _success(reaches: str, rows: int, epochs: int) -> Step:
 
 
 def _show(method: str, reaches: str = "synthetic") -> str:
-    return f"eval --method {method} --reaches {reaches} --seed 0 --split test --runs {{runs}}/show"
+    return f"eval --method {method} --preset quick --reaches {reaches} --seed 0 --split test --runs {{runs}}/show"
 
 
 STEPS: tuple[Step, ...] = (
@@ -107,14 +113,16 @@ STEPS: tuple[Step, ...] = (
     _experts("synthetic"),
     *(_run(name, name, reaches) for reaches in ("real", "synthetic") for name in RULES),
     *(_run(name, name, "minjerk") for name in ("nothing", "random")),
+    _quick("sim-0.1", "sim", "minjerk", SEEDS),
+    *(_quick(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
+    _quick("sor", "sor", "real", SEEDS, (SIM_QUICK,)),
+    *(_quick(label, flags, "synthetic") for label, flags in LEARNERS.items()),
+    _quick("sor", "sor", "synthetic", needs=(SIM_QUICK,)),
+    *(_quick("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
-    _run("rlil-0.1-quick", "rlil --dur 0.1 --preset quick", "real", SEEDS),
     _run("stopping", "stopping", "real", SEEDS),
     _run("sor", "sor", "real", SEEDS, (SIM,)),
-    *(_run(label, flags, "synthetic") for label, flags in LEARNERS.items()),
-    _run("stopping", "stopping", "synthetic"),
-    _run("sor", "sor", "synthetic", needs=(SIM,)),
     _success("real", 3_000_000, 16),
     _success("synthetic", 1_000_000, 30),
     *(_run("omega", "omega", r, needs=(f"{DATA}/success-{r}.safetensors",)) for r in ("real", "synthetic")),
@@ -126,7 +134,7 @@ STEPS: tuple[Step, ...] = (
             _show("sim", "minjerk"),
             "recordings choose --runs {runs}/show --into recordings",
         ),
-        needs=(SPLITS, f"{WEIGHTS}/*/*/seed0.safetensors", f"{DATA}/success-synthetic.safetensors"),
+        needs=(SPLITS, f"{WEIGHTS}/*-quick/*/seed0.safetensors", f"{DATA}/success-synthetic.safetensors"),
         makes=("recordings/*.rrd",),
     ),
     Step(
