@@ -92,8 +92,8 @@ SIM_QUICK = f"{WEIGHTS}/sim-0.1-quick/minjerk/*"
 
 
 def _success(reaches: str, rows: int, epochs: int) -> Step:
-    """The success model, trained on episodes of the experts and of policies of a fifth of the budget."""
-    policies = [f"{WEIGHTS}/{label}/{reaches}/*.safetensors" for label in ("rlil-0.1-quick", "rlil-0.3-quick")]
+    """The success model, trained on episodes of the experts, of a policy that often fails, and of one that rarely does."""
+    policies = [f"{WEIGHTS}/{label}/{reaches}/*.safetensors" for label in ("bc-quick", "rlil-0.1-quick")]
     data = f"success data --reaches {reaches} --rows {rows} --policies {' '.join(policies)} --runs {{runs}}"
     train = f"success train --reaches {reaches} --epochs {epochs} --runs {{runs}}"
     copies = ((f"success/{reaches}/seed0/model.safetensors", f"{DATA}/success-{reaches}.safetensors"),)
@@ -118,12 +118,11 @@ STEPS: tuple[Step, ...] = (
     _quick("sor", "sor", "real", SEEDS, (SIM_QUICK,)),
     *(_quick(label, flags, "synthetic") for label, flags in LEARNERS.items()),
     _quick("sor", "sor", "synthetic", needs=(SIM_QUICK,)),
-    *(_quick("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
-    _run("stopping", "stopping", "real", SEEDS),
+    *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
     _run("sor", "sor", "real", SEEDS, (SIM,)),
-    _success("real", 3_000_000, 16),
+    _success("real", 1_000_000, 30),
     _success("synthetic", 1_000_000, 30),
     *(_run("omega", "omega", r, needs=(f"{DATA}/success-{r}.safetensors",)) for r in ("real", "synthetic")),
     Step(

@@ -6,6 +6,7 @@ A number stands in a Markdown file between two comments, `<!--=KEY-->` and `<!--
 | --- | --- |
 | `METHOD REACHES SPLIT return` | mean return of a row of the leaderboard, such as 17.6 |
 | `METHOD REACHES SPLIT success` | success rate of that row [%] |
+| `results REACHES` | a table of all methods on a source: mean return and success rate [%] on each split |
 | `METHOD REACHES SPLIT CAUSE` | share of its episodes that end with a cause [%]; `-` stands for a blank |
 | `search REACHES draws`, `settings`, `kept`, `solved` | a count of the search for experts |
 | `search REACHES kept_rate`, `solved_rate` | a rate of the search, per draw [%] |
@@ -31,7 +32,7 @@ from dextron_bench.reaches.sources import RankedSource
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
 from dextron_bench.splits import hard
-from dextron_bench.splits.loading import load_split
+from dextron_bench.splits.loading import SPLIT_NAMES, load_split
 from dextron_bench.storage import atomic
 from dextron_bench.world import model
 
@@ -78,6 +79,8 @@ def _values(board: Path) -> Callable[[str], str]:
         match key.split():
             case ["physics"]:
                 return model.mjcf_hash()[:8]
+            case ["results", reaches]:
+                return _results(rows(), reaches)
             case ["search", "totals"]:
                 return _totals()
             case ["search", "regions"]:
@@ -108,6 +111,24 @@ def _of_row(rows: pd.DataFrame, method: str, reaches: str, split: str, name: str
         return f"{row['return']:.1f}"
     share = row["success"] if name == "success" else row[name.replace("-", " ")] / row["episodes"]
     return f"{100 * share:.1f}"
+
+
+def _results(rows: pd.DataFrame, reaches: str) -> str:
+    """Mean return and success rate [%] of every method on each split of a source, best on `test` first."""
+    rows = rows[rows["reaches"] == reaches]
+    splits = [name for name in SPLIT_NAMES if name in set(rows["split"])]
+    if "test" not in splits:
+        raise KeyError(f"no method has a row on `test` of {reaches}")
+    cells = {
+        (row["method"], row["split"]): f"{row['return']:.1f}, {100 * row['success']:.1f} %"
+        for row in rows.to_dict("records")
+    }
+    on_test = rows[rows["split"] == "test"].sort_values("return", ascending=False, kind="stable")
+    lines = [
+        [f"`{row['method']}`", str(row["seeds"]), *(cells.get((row["method"], name), "") for name in splits)]
+        for row in on_test.to_dict("records")
+    ]
+    return _markdown(["method", "seeds", *(f"`{name}`" for name in splits)], lines)
 
 
 def _search(summary: Mapping[str, Any], name: str) -> str:

@@ -49,6 +49,12 @@ def test_a_number_is_replaced_by_its_present_value(board: Path, key: str, expect
     assert filled(board, f"before {number(key)} after") == f"before <!--={key}-->{expected}<!--.--> after"
 
 
+def test_a_table_of_the_results_on_a_source(board: Path):
+    shown = filled(board, number("results real"))
+    assert "| method | seeds | `test` |" in shown
+    assert "| `mine` | 1 | 11.8, 50.0 % |" in shown
+
+
 def test_numbers_of_the_search(board: Path, monkeypatch: pytest.MonkeyPatch):
     """30 of 1,200 draws are 2.50 %; by d_c, half of 40 draws are solved."""
     rows = [
@@ -71,7 +77,7 @@ def test_filling_again_changes_nothing(board: Path):
     assert documents.fill([file], board) == []
 
 
-@pytest.mark.parametrize("key", ["nonsense", "other real test return", "mine real test speed", "search real speed"])
+@pytest.mark.parametrize("key", ["nonsense", "results synthetic", "other real test return", "mine real test speed", "search real speed"])
 def test_a_key_that_names_nothing_is_refused_and_the_file_stays(board: Path, key: str):
     with pytest.raises(documents.UnknownNumber, match="names no number"):
         filled(board, number(key))
