@@ -122,8 +122,8 @@ STEPS: tuple[Step, ...] = (
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
     *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
     _run("sor", "sor", "real", SEEDS, (SIM,)),
-    _success("real", 1_000_000, 30),
-    _success("synthetic", 1_000_000, 30),
+    _success("real", 400_000, 15),
+    _success("synthetic", 400_000, 15),
     *(_run("omega", "omega", r, needs=(f"{DATA}/success-{r}.safetensors",)) for r in ("real", "synthetic")),
     Step(
         "recordings",
