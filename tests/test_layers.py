@@ -34,7 +34,7 @@ LEVELS = {
 SDKS = {  # Packages of others that one place alone imports.
     "rerun": "dextron_bench/recording/",
     "rerun_bindings": "dextron_bench/recording/",
-    "matplotlib": "dextron_bench/scores/figures.py",
+    "matplotlib": "dextron_bench/scores/figures/",
     "minari": "dextron_bench/evaluation/minari_export.py",
     "av": "dextron_bench/recording/film.py",
     "tensorboard": "dextron_bench/tracking/to_tensorboard.py",

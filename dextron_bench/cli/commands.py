@@ -30,6 +30,7 @@ from dextron_bench.cli import (
     success_eval,
     sweep,
     view,
+    windows,
 )
 from dextron_bench.cli import eval as evaluation
 from dextron_bench.cli import list as listing
@@ -90,6 +91,7 @@ COMMANDS: dict[str, type[Command] | Group] = {
         {"data": success.Data, "train": success.Train, "eval": success_eval.Eval, "explain": success_eval.Explain},
     ),
     "figures": figures.Figures,
+    "windows": windows.Windows,
     "rebuild": rebuild.Rebuild,
     "doctor": doctor.Doctor,
 }
