@@ -7,6 +7,7 @@ from typing import Protocol
 from dextron_bench.cli import (
     check,
     compare,
+    cross_validate,
     data,
     data_export,
     data_synthetic,
@@ -48,6 +49,7 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
     "sweep": sweep.Sweep,
+    "cross-validate": cross_validate.CrossValidate,
     "leaderboard": (
         "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
         "add a submission to it; play fresh settings.",
