@@ -39,8 +39,11 @@ def load(track: Track) -> Openings:
 
 def _play_missing(track: Track, groups: Sequence[tuple[Path, list[Setting]]]) -> None:
     """Plays groups of settings, at least TOGETHER settings at once, and writes the file of each group."""
+    total = sum(len(settings) for _, settings in groups)
+    played = 0
     waiting: list[tuple[Path, list[Setting]]] = []
     for number, group in enumerate(groups, 1):
+        track.report(played, total, "settings opened, with forks")
         waiting.append(group)
         if sum(len(settings) for _, settings in waiting) < TOGETHER and number < len(groups):
             continue
@@ -48,6 +51,7 @@ def _play_missing(track: Track, groups: Sequence[tuple[Path, list[Setting]]]) ->
         for file, settings in waiting:
             arrays = asdict(joined([next(episodes) for _ in settings]))
             tensors.write(file, arrays, {})
+            played += len(settings)
         waiting.clear()
 
 

@@ -65,7 +65,7 @@ class CrossValidate:
             label: self._play(run.plan, seeds if number == 0 or run.learner else seeds[:1])
             for number, (label, run) in enumerate(runs.items())
         }
-        self._print(table, len(seeds))
+        self._print(table, seeds)
         return EPISODES_FAILED if any(part.failed for parts in table.values() for part in parts) else DONE
 
     def _play(self, plan: Any, seeds: tuple[int, ...]) -> list[LeftOut]:
@@ -75,7 +75,7 @@ class CrossValidate:
         resources = Resources(self.runs, self.threads, self.device, lambda title: progress_bar(title, self.quiet))
         return list(cross_validation.cross_validate(plan, seeds, resources))
 
-    def _print(self, table: dict[str, list[LeftOut]], seeds: int) -> None:
+    def _print(self, table: dict[str, list[LeftOut]], seeds: tuple[int, ...]) -> None:
         """Prints a row for each subject, and one for all settings."""
         import numpy as np
 
@@ -103,7 +103,8 @@ class CrossValidate:
             [subject, str(count), *(_percent(successes) for _, successes in estimates)]
             for subject, count, estimates in rows
         ]
-        title = f"subjects of train of {self.reaches} reaches, each left out in turn; {seeds} seeds of {self.method}"
+        names = " ".join(map(str, seeds))
+        title = f"subjects of train of {self.reaches} reaches, each left out in turn; seeds {names}"
         print_markdown(columns, cells) if self.markdown else print_table(title, columns, cells)
 
 

@@ -61,7 +61,8 @@ def draw(content: Mapping[str, Any], trials: list[Trial], file: Path) -> None:
         for trial in trials
         if trial.returns and trial.successes
     ]
-    title = f"{question['method']} on val of {question['reaches']} reaches, {len(question['seeds'])} seeds"
+    seeds = " ".join(map(str, question["seeds"]))
+    title = f"{question['method']} on val of {question['reaches']} reaches, seeds {seeds}"
     file.parent.mkdir(parents=True, exist_ok=True)
     sweeps.scaling(points, setting, title, file)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dextron_bench.methods import registry
@@ -54,7 +54,7 @@ class TrainingJob:
         for seed in seeds:
             folder_config.check(self.run_folder(seed).path, registry.run_config(self.learner, self.reaches, seed))
         for group in self.groups(seeds):
-            track, val = self.track(), self._split("val")
+            track, val = replace(self.track(), report=report), self._split("val")
             for seed in group:
                 config = registry.run_config(self.learner, self.reaches, seed)
                 folder_config.write_or_check(self.run_folder(seed).path, config)

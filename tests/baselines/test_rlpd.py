@@ -130,7 +130,7 @@ def test_labels_name_the_settings_that_differ_and_impossible_ones_are_refused():
     assert Rlpd(critics=10, updates=20, batch=256, preset="quick").label == "rlpd-10c-20u-256b-quick"
     for settings in ({"critics": 1}, {"updates": 0}, {"batch": 7}, {"batch": 0}):
         with pytest.raises(BadEnsemble, match="give 2 critics or more"):
-            Rlpd(**settings)
+            Rlpd(**settings)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

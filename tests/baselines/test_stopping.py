@@ -31,9 +31,12 @@ def played() -> Openings:
 def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
     played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    everything, first_reach = Track(SOURCE, CASES * 2, tmp_path, threads=1), SETTINGS[0].reach
+    reported: list[tuple[int, int]] = []
+    everything = Track(SOURCE, CASES * 2, tmp_path, 1, report=lambda done, total, note: reported.append((done, total)))
+    first_reach = SETTINGS[0].reach
     first = openings.load(everything)
     assert len(first) == len(CASES)  # Each setting counts once.
+    assert reported == [(0, 5), (0, 5)]  # Both reaches are played together.
     for name in ("states", "outcomes", "starts"):
         np.testing.assert_array_equal(getattr(first, name), getattr(played, name))
     monkeypatch.setattr(openings, "play", None)
