@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from dextron_bench.scores.figures.pictures import check_format, save
-from dextron_bench.scores.statistics import Estimate
+from dextron_bench.scores.statistics import RETURNS, SHARES, Bounds, Estimate
 
 WIDE = 8.0  # Ratio of the largest to the smallest value from which on the axis is logarithmic.
 
@@ -36,19 +36,20 @@ def scaling(points: Sequence[Point], setting: str, title: str, file: Path) -> No
     values = np.array([point.value for point in points])
     figure = Figure(figsize=(8, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _draw(left, values, [point.returns for point in points], 1.0)
-    _draw(right, values, [point.successes for point in points], 100.0)
+    _draw(left, values, [point.returns for point in points], RETURNS, 1.0)
+    _draw(right, values, [point.successes for point in points], SHARES, 100.0)
     left.set(xlabel=setting, ylabel="sum of rewards")
     right.set(xlabel=setting, ylabel="success [%]")
     figure.suptitle(title, fontsize=10)
     save(figure, file, 150)
 
 
-def _draw(axes: Axes, values: np.ndarray, estimates: Sequence[Estimate], unit: float) -> None:
+def _draw(axes: Axes, values: np.ndarray, estimates: Sequence[Estimate], bounds: Bounds, unit: float) -> None:
     mean, low, high = (unit * np.array([getattr(one, name) for one in estimates]) for name in ("mean", "low", "high"))
     axes.errorbar(values, mean, yerr=[mean - low, high - mean], fmt="o-", capsize=3, markersize=4, linewidth=1.2)
     if len(values) and values[0] > 0.0 and values[-1] >= WIDE * values[0]:
         axes.set_xscale("log")
         axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticks(values, [f"{value:g}" for value in values])
+    axes.set_ylim(top=min(axes.get_ylim()[1], 1.01 * unit * bounds[1]))
     axes.grid(axis="y", color="0.9")
