@@ -53,8 +53,8 @@ class Networks(Protocol):
 class Cycle:
     """The Trainer of RL and RLIL: trains S agents by SAC; each batch has a share of demonstrations.
 
-    RLPD replaces the networks (`_make_networks`), the demonstrations (`_load_demonstrations`,
-    `_select_demonstrations`) and what is drawn and learned at a frame (`_draw`, `_update`).
+    RLPD replaces the networks, the choice of demonstrations, the scale of rewards, and what is drawn and learned at a
+    frame: `_make_networks`, `_load_demonstrations`, `_select_demonstrations`, `_scaled_rewards`, `_draw`, `_update`.
     """
 
     losses = "action_value_loss", "value_loss", "policy_loss"  # What an update returns for each agent.
@@ -245,11 +245,14 @@ class Cycle:
         mean, deviation = (array[:, None].astype(np.float32) for array in scale)
         both = np.concatenate([parts.states, parts.nexts], axis=1)
         scaled = self._tensor((both - mean) / deviation).clamp_(-CLIP, CLIP)
-        rewards = np.clip(parts.rewards / self._rewards.deviation, -CLIP, CLIP)
-        columns = (parts.actions, rewards, ~parts.terminated)
+        columns = (parts.actions, self._scaled_rewards(parts.rewards), ~parts.terminated)
         actions, rewards, alive = (self._tensor(array)[..., None] for array in columns)
         size = uniform.shape[1]
         return Batch(scaled[:, :size], actions, rewards, scaled[:, size:], alive)
+
+    def _scaled_rewards(self, rewards: np.ndarray) -> np.ndarray:
+        """Rewards (S, B) as the networks learn them."""
+        return np.clip(rewards / self._rewards.deviation, -CLIP, CLIP)
 
     def _select_demonstrations(self, uniform: np.ndarray) -> Transitions:
         """Like `Replay.select`, from the demonstrations streamed so far."""

@@ -1,7 +1,7 @@
 """RLPD: SAC with half of each batch from demonstrations, and an ensemble of normalised Q (Ball et al., ICML 2023).
 
-The targets of all Q are the smaller value of a random pair of them; the policy climbs their mean. The temperature is
-learned, so that the policy keeps a given entropy.
+The target of all Q is the smaller value of a random pair of them; the policy climbs their mean. The temperature is
+learned, so that the policy keeps an entropy.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PAIRS = 9  # A random stream of each seed; 0 to 7 belong to `Cycle`.
 
 
 class BadEnsemble(ValueError):
-    """A number of critics, of updates or of transitions that no training can have."""
+    """A number of critics, updates or transitions that no training can have."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,8 @@ class Rlpd(Scheduled):
 
     def __post_init__(self) -> None:
         if self.critics < 2 or self.updates < 1 or self.batch < 2 or self.batch % 2:
-            raise BadEnsemble(
-                f"--critics {self.critics} --updates {self.updates} --batch {self.batch}: "
-                "give 2 critics or more, 1 update or more, and an even batch"
-            )
+            flags = f"--critics {self.critics} --updates {self.updates} --batch {self.batch}"
+            raise BadEnsemble(f"{flags}: give 2 critics or more, 1 update or more, and an even batch")
 
     @property
     def stem(self) -> str:
@@ -95,6 +93,9 @@ class SymmetricCycle(Cycle):
         """Like `Replay.select`, from all demonstrations."""
         return self._demos.at(self._demonstrated_rows[(uniform * len(self._demonstrated_rows)).astype(int)])
 
+    def _scaled_rewards(self, rewards: np.ndarray) -> np.ndarray:
+        return rewards  # The learned temperature fits any scale.
+
     def _draw(self) -> tuple[np.ndarray, ...]:
         """Numbers that select transitions (FRAMES, S, G B), noises (FRAMES, S, (G + 1) B), and orders of the Q."""
         updates, batch, critics = self._method.updates, self._method.batch, self._method.critics
@@ -118,7 +119,7 @@ class SymmetricCycle(Cycle):
 def action_values(parameters: Sequence[Tensor], states: Tensor, actions: Tensor) -> Tensor:
     """Q (n, B, 1) of n perceptrons, whose hidden layers are normalised before their ReLU.
 
-    The normalisation has no scale and no shift of its own, and follows the bias.
+    The normalisation follows the bias, and has no scale and no shift.
     """
     w1, b1, w2, b2, w3, b3 = parameters
     hidden = layer_norm(torch.baddbmm(b1, torch.cat([states, actions], dim=-1), w1), (HIDDEN,)).relu()
@@ -132,16 +133,12 @@ class Ensemble:
     def __init__(self, rngs: Sequence[np.random.Generator], device: str, critics: int) -> None:
         self._agents, self._critics = len(rngs), critics
         self._policy = Stack.make(STATE, 2, rngs, device)
+        self.policy = self._policy.parameters
         self.values = Stack.make(STATE + 1, 1, [*rngs] * critics, device).parameters
         self.targets = [parameter.detach().clone() for parameter in self.values]
         self.log_temperature = torch.zeros(self._agents, 1, 1, device=device, requires_grad=True)
-        parts = self._policy.parameters, self.values, [self.log_temperature]
+        parts = self.policy, self.values, [self.log_temperature]
         self._parts = [(part, torch.optim.Adam(part, lr=LEARNING_RATE)) for part in parts]
-
-    @property
-    def policy(self) -> list[Tensor]:
-        """The policies' parameters, as in `Stack`."""
-        return self._policy.parameters
 
     @torch.no_grad()
     def act(self, states: Tensor, noise: Tensor) -> Tensor:

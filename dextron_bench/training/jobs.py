@@ -113,6 +113,7 @@ class TrainingJob:
         frames = schemas.read_about(checkpoints.snapshot(last, seed), schemas.SNAPSHOT).get("frames")
         about = schemas.read_about(snapshot, schemas.SNAPSHOT)
         about |= {"best_epoch": best, "epochs": last, "frames": frames and int(frames)}
+        about |= {"without": self.without} if self.without else {}
         del about["epoch"]
         atomic.write_json(run.curve, {"split": "val", "points": curve.points(seed)})
         tensors.write(run.weights, tensors.read(snapshot), about | {"reaches": self.reaches})

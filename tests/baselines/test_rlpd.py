@@ -15,7 +15,9 @@ from baselines.rlpd import BadEnsemble, Ensemble, Rlpd, SymmetricCycle
 from baselines.sac import Batch
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import Track
-from tests.helpers.short_reaches import SETTINGS, SOURCE
+from dextron_bench.reaches.setting import Setting
+from tests.helpers.short_reaches import SOURCE
+from tests.helpers.tiny_benchmark import SOLVED
 
 
 def batch(rng: np.random.Generator, agents: int, size: int = 4) -> Batch:
@@ -110,7 +112,7 @@ def test_seeds_trained_together_equal_seeds_trained_alone():
 
 def test_half_of_a_batch_comes_from_all_demonstrations(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """From the first update on; the paper's RLIL has only the demonstrations that were streamed so far."""
-    cases = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS[:2]]
+    cases = [Case(Setting(*row[:4]), Expert(*row[4:6]), row[6]) for row in SOLVED]
     trainer = SymmetricCycle(Track(SOURCE, cases, tmp_path, threads=1), [0], Rlpd(batch=8))
     rows = trainer._demonstrated_rows
     demos = trainer._select_demonstrations(np.array([[0.0, 0.5, 1.0 - 1e-9]]))
@@ -119,10 +121,12 @@ def test_half_of_a_batch_comes_from_all_demonstrations(tmp_path: Path, monkeypat
     np.testing.assert_array_equal(demos.nexts[0], trainer._demos.states[expected + 1])
     monkeypatch.setattr("baselines.cycle.FRAMES", 3)
     trainer.advance()
-    made = trainer._batch(np.full((1, 8), 0.999))
-    last = trainer._demos.actions[rows[int(0.999 * len(rows))]]
-    assert made.actions[0, :4, 0].tolist() == [pytest.approx(float(last))] * 4
-    assert (made.actions[0, 4:, 0] != float(last)).all()
+    rewarded = np.flatnonzero(trainer._demos.rewards[rows] > 0.0)[0]
+    made = trainer._batch(np.full((1, 8), (rewarded + 0.5) / len(rows)))
+    assert made.rewards[0, :, 0].tolist() == [1.0] * 4 + [0.0] * 4  # They are not scaled.
+    action = float(trainer._demos.actions[rows[rewarded]])
+    assert made.actions[0, :4, 0].tolist() == [action] * 4
+    assert (made.actions[0, 4:, 0] != action).all()
 
 
 def test_labels_name_the_settings_that_differ_and_impossible_ones_are_refused():

@@ -17,7 +17,7 @@ from dextron_bench.methods.learners import Track
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, tensors
 from dextron_bench.sweeps import cross_validation
 from tests.helpers import tiny_benchmark, tiny_training
 from tests.helpers.tiny_training import TOY, TRANSFER
@@ -69,6 +69,8 @@ def test_a_method_learns_without_each_subject_and_plays_its_settings(
         assert sorted(place.name for place in here.glob(f"runs/without/{subject}/toy-0.1/synthetic/seed*")) == [
             "seed0", "seed3"
         ]  # fmt: skip
+        weights = here / f"runs/without/{subject}/toy-0.1/synthetic/seed0/weights.safetensors"
+        assert tensors.read_about(weights)["without"] == subject
         files = list(here.glob(f"runs/without/{subject}/*/synthetic/seed*/left-out.json"))
         assert len(files) == 3  # Two seeds of the learner, and the first one of the expert.
     assert main.main(validate("--seed", "0", "3", "--markdown")) == 0
