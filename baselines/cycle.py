@@ -5,7 +5,8 @@ The file is longer than 200 lines because one class holds the whole state of a t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -28,8 +29,35 @@ FRAMES = 1000  # Control steps of the agent in an epoch.
 NETWORKS, EPISODES, DEMONSTRATIONS, ACTING, WARM_START, BATCHES, NOISE, HOLDING = range(8)
 
 
+class Networks(Protocol):
+    """The networks of S agents, with their optimisers."""
+
+    @property
+    def policy(self) -> list[Tensor]:
+        """The policies' parameters, as in `Stack`."""
+        ...
+
+    def act(self, states: Tensor, noise: Tensor) -> Tensor:
+        """Sampled actions (S, B, 1) in scaled states (S, B, 48) for standard normal noise (S, B, 1)."""
+        ...
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Copies of everything that training changes, by name."""
+        ...
+
+    def load(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restores the arrays that `save` returned."""
+        ...
+
+
 class Cycle:
-    """The Trainer of RL and RLIL: trains S agents by SAC; each batch has a share of demonstrations."""
+    """The Trainer of RL and RLIL: trains S agents by SAC; each batch has a share of demonstrations.
+
+    RLPD replaces the networks, the choice of demonstrations, the scale of rewards, and what is drawn and learned at a
+    frame: `_make_networks`, `_load_demonstrations`, `_select_demonstrations`, `_scaled_rewards`, `_draw`, `_update`.
+    """
+
+    losses = "action_value_loss", "value_loss", "policy_loss"  # What an update returns for each agent.
 
     def __init__(
         self,
@@ -45,7 +73,7 @@ class Cycle:
         self._track, self._seeds, self._schedule, self._exploration = track, list(seeds), schedule, exploration
         self._demonstrated, self._frames = demonstrated, 0
         agents = len(self._seeds)
-        self._sac = Sac([self._rng(seed, NETWORKS) for seed in seeds], track.device, critics)
+        self._sac = self._make_networks([self._rng(seed, NETWORKS) for seed in seeds], critics)
         self._states, self._rewards = Moments(agents, STATE), Moments(agents, 1)
         self._replay = Replay(agents, CAPACITY + CAPACITY // 16)
         self._ids = np.arange(agents)
@@ -55,16 +83,23 @@ class Cycle:
         self._noise, self._length, self._holds = np.zeros((agents, 1)), np.zeros(agents, int), np.zeros(agents, bool)
         self._recent: list[tuple[Transitions, np.ndarray]] = []
         if demonstrated:
-            self._demos = demonstrations.load(track, schedule.episodes)
-            length = schedule.epochs * FRAMES
-            self._stream = np.stack([self._demos.stream(self._rng(seed, DEMONSTRATIONS), length) for seed in seeds])
+            self._load_demonstrations()
         self._now = self._begin(self._ids)
+
+    def _make_networks(self, rngs: Sequence[np.random.Generator], critics: int) -> Networks:
+        """The networks of each agent, drawn from its own generator."""
+        return Sac(rngs, self._track.device, critics)
+
+    def _load_demonstrations(self) -> None:
+        """Loads the demonstrations, and draws the order in which each seed's expert plays them."""
+        self._demos, length = demonstrations.load(self._track, self._schedule.episodes), self._schedule.epochs * FRAMES
+        streams = [self._demos.stream(self._rng(seed, DEMONSTRATIONS), length) for seed in self._seeds]
+        self._stream = np.stack(streams)
 
     def advance(self) -> list[dict[str, float]]:
         """Trains for FRAMES cycles; returns each seed's losses, number of finished episodes and their mean return."""
         acting, random = self._normal(ACTING, 1), self._uniform(WARM_START, 1) * 2.0 - 1.0
-        selections = self._uniform(BATCHES, BATCH)
-        noise = torch.tensor(self._normal(NOISE, BATCH)[..., None], dtype=torch.float32, device=self._track.device)
+        draws = self._draw()
         losses: list[Tensor] = []
         scores: list[list[float]] = [[] for _ in self._seeds]
         for t in range(FRAMES):
@@ -72,9 +107,19 @@ class Cycle:
             noise_now = self._hold(acting[t] if is_warm else random[t], everywhere=not is_warm)
             self._step(self._act(noise_now) if is_warm else noise_now, scores)
             if is_warm or self._frames >= self._first_update:
-                losses.append(self._sac.update(self._batch(selections[t]), noise[t]))
+                losses.append(self._update([draw[t] for draw in draws]))
         self.epoch += 1
         return self._metrics(losses, scores)
+
+    def _draw(self) -> tuple[np.ndarray, ...]:
+        """The random numbers of this epoch's updates, (FRAMES, S, ...)."""
+        return self._uniform(BATCHES, BATCH), self._normal(NOISE, BATCH)
+
+    def _update(self, drawn: Sequence[np.ndarray]) -> Tensor:
+        """The update of a frame, with its random numbers (S, ...); returns the losses (n, S)."""
+        uniform, noise = drawn
+        assert isinstance(self._sac, Sac)
+        return self._sac.update(self._batch(uniform), self._tensor(noise[..., None]))
 
     @property
     def _first_update(self) -> int:
@@ -191,7 +236,7 @@ class Cycle:
         return self._sac.act(states, noise_now)[:, 0].double().cpu().numpy()
 
     def _batch(self, uniform: np.ndarray) -> Batch:
-        """The scaled transitions that numbers (S, BATCH) in [0, 1) select; demonstrations come first."""
+        """The scaled transitions that numbers (S, B) in [0, 1) select; demonstrations come first."""
         parts = self._replay.select(uniform[:, self._demonstrated :])
         if self._demonstrated:
             demos = self._select_demonstrations(uniform[:, : self._demonstrated])
@@ -200,19 +245,20 @@ class Cycle:
         mean, deviation = (array[:, None].astype(np.float32) for array in scale)
         both = np.concatenate([parts.states, parts.nexts], axis=1)
         scaled = self._tensor((both - mean) / deviation).clamp_(-CLIP, CLIP)
-        rewards = np.clip(parts.rewards / self._rewards.deviation, -CLIP, CLIP)
-        columns = (parts.actions, rewards, ~parts.terminated)
+        columns = (parts.actions, self._scaled_rewards(parts.rewards), ~parts.terminated)
         actions, rewards, alive = (self._tensor(array)[..., None] for array in columns)
-        return Batch(scaled[:, :BATCH], actions, rewards, scaled[:, BATCH:], alive)
+        size = uniform.shape[1]
+        return Batch(scaled[:, :size], actions, rewards, scaled[:, size:], alive)
+
+    def _scaled_rewards(self, rewards: np.ndarray) -> np.ndarray:
+        """Rewards (S, B) as the networks learn them."""
+        return np.clip(rewards / self._rewards.deviation, -CLIP, CLIP)
 
     def _select_demonstrations(self, uniform: np.ndarray) -> Transitions:
         """Like `Replay.select`, from the demonstrations streamed so far."""
         oldest = max(self._frames - CAPACITY, 0)
         place = oldest + (uniform * (self._frames - oldest)).astype(int)
-        rows = self._stream[self._ids[:, None], place]
-        demos = self._demos
-        never = np.zeros(rows.shape, bool)
-        return Transitions(demos.states[rows], demos.actions[rows], demos.rewards[rows], demos.states[rows + 1], never)
+        return self._demos.at(self._stream[self._ids[:, None], place])
 
     def _metrics(self, losses: list[Tensor], scores: list[list[float]]) -> list[dict[str, float]]:
         metrics: list[dict[str, float]] = [{"frames": self._frames, "episodes": len(returns)} for returns in scores]
@@ -220,9 +266,8 @@ class Cycle:
             values |= {"score": float(np.mean(returns))} if returns else {}
         if losses:
             means = torch.stack(losses).mean(dim=0).double().cpu().numpy()
-            names = ("action_value_loss", "value_loss", "policy_loss")
             for k, values in enumerate(metrics):
-                values |= dict(zip(names, means[:, k].tolist(), strict=True))
+                values |= dict(zip(self.losses, means[:, k].tolist(), strict=True))
         return metrics
 
     def _tensor(self, array: np.ndarray) -> Tensor:

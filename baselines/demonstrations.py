@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from baselines.replay import Transitions
 from dextron_bench import Case, ExpertAgent, Track, rollout
 from dextron_bench.storage import atomic, hashing, tensors
 from dextron_bench.world import model
@@ -34,6 +35,11 @@ class Demonstrations:
     def transitions(self) -> np.ndarray:
         """The rows (n,) that begin a transition, in order."""
         return np.delete(np.arange(len(self.states)), self.starts[1:] - 1)
+
+    def at(self, rows: np.ndarray) -> Transitions:
+        """The transitions that begin at rows (...), as `transitions` has them."""
+        never = np.zeros(rows.shape, bool)
+        return Transitions(self.states[rows], self.actions[rows], self.rewards[rows], self.states[rows + 1], never)
 
     def stream(self, rng: np.random.Generator, length: int) -> np.ndarray:
         """Rows (length,) that begin a transition, from whole episodes that are drawn with replacement."""

@@ -1,52 +1,20 @@
-"""When closing works: episodes with an opening hand, forked at every decision, with a hand that closes from there.
+"""Openings of the settings of `train`, kept in files by reach: what the labels of STOPPING are made of.
 
 The forks are a privilege of training: they need a simulator that can be copied. An agent sees states alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
-
 from dextron_bench import Setting, Track
-from dextron_bench.reaches import reach
-from dextron_bench.reaches.setting import Source
+from dextron_bench.experts.openings import EVERY, NEAR, TOGETHER, Episode, Openings, joined, play
 from dextron_bench.storage import atomic, hashing, tensors
-from dextron_bench.world import model, task
-from dextron_bench.world.engine import Engine
+from dextron_bench.world import model
 
 FORMAT = 1  # Version of the cached file.
-NEAR = 0.16  # [m] distance within which an agent decides.
-EVERY = 2  # Control steps between decisions.
-FIRST_TRIED = 3  # Every third decision is tried; then the decisions between a success and a failure.
-TOGETHER = 96  # Settings that are played together.
-SLOTS = 1024
-NO_DECISION, FAILS, SUCCEEDS = -1, 0, 1
-Episode = tuple[np.ndarray, np.ndarray]  # States (T, 48) and outcomes (T,) of an opening.
-
-
-@dataclass(frozen=True, slots=True)
-class Openings:
-    """Episodes with an opening hand, one after the other: states (R, 48), float32, and `outcomes` (R,), int8.
-
-    Episode k has the rows from `starts[k]` to `starts[k + 1]`. An outcome says whether a hand that closes at full speed
-    from that state on earns all rewards: SUCCEEDS, FAILS, or NO_DECISION. If two decisions that were tried have one
-    outcome, the decisions between them are taken to have it too.
-    """
-
-    states: np.ndarray
-    outcomes: np.ndarray
-    starts: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.starts) - 1
-
-    def rows(self, episode: int) -> slice:
-        """The rows of an episode."""
-        return slice(self.starts[episode], self.starts[episode + 1])
 
 
 def settings_of(track: Track) -> list[Setting]:
@@ -69,27 +37,13 @@ def load(track: Track) -> Openings:
     return joined([episodes[setting] for setting in settings])
 
 
-def play(source: Source, settings: Sequence[Setting], threads: int = 0) -> list[Episode]:
-    """The openings of some settings."""
-    engine = Engine(SLOTS, threads)
-    return [
-        episode
-        for first in range(0, len(settings), TOGETHER)
-        for episode in _play_together(engine, source, settings[first : first + TOGETHER])
-    ]
-
-
-def joined(episodes: Sequence[Episode]) -> Openings:
-    """Openings, one after the other."""
-    states, outcomes = zip(*episodes, strict=True)
-    starts = np.concatenate([[0], np.cumsum([len(part) for part in states])])
-    return Openings(np.concatenate(states).astype(np.float32), np.concatenate(outcomes), starts)
-
-
 def _play_missing(track: Track, groups: Sequence[tuple[Path, list[Setting]]]) -> None:
     """Plays groups of settings, at least TOGETHER settings at once, and writes the file of each group."""
+    total = sum(len(settings) for _, settings in groups)
+    played = 0
     waiting: list[tuple[Path, list[Setting]]] = []
     for number, group in enumerate(groups, 1):
+        track.report(played, total, "settings opened, with forks")
         waiting.append(group)
         if sum(len(settings) for _, settings in waiting) < TOGETHER and number < len(groups):
             continue
@@ -97,6 +51,7 @@ def _play_missing(track: Track, groups: Sequence[tuple[Path, list[Setting]]]) ->
         for file, settings in waiting:
             arrays = asdict(joined([next(episodes) for _ in settings]))
             tensors.write(file, arrays, {})
+            played += len(settings)
         waiting.clear()
 
 
@@ -107,74 +62,6 @@ def _read(file: Path) -> list[Episode]:
     except (tensors.BadTensors, TypeError) as error:
         raise atomic.DamagedFile(file, error) from error
     return [(stored.states[rows], stored.outcomes[rows]) for rows in map(stored.rows, range(len(stored)))]
-
-
-def _play_together(engine: Engine, source: Source, settings: Sequence[Setting]) -> Iterator[Episode]:
-    """The opening of each setting."""
-    paths = [source.path(setting) for setting in settings]
-    live = np.arange(len(settings))
-    states = engine.begin(live, paths)
-    episodes: list[list[np.ndarray]] = [[] for _ in settings]
-    first_near = np.full(len(settings), -1)
-    decisions, saved = [], []
-    for step in range(task.STEP_LIMIT + 1):
-        for k, state in zip(live, states, strict=True):
-            episodes[k].append(state)
-        is_near = task.distance(states) < NEAR
-        first_near[live[is_near & (first_near[live] < 0)]] = step
-        decides = live[(first_near[live] >= 0) & ((step - first_near[live]) % EVERY == 0)]
-        decisions.append(np.stack([decides, np.full_like(decides, step)], axis=1))
-        saved.append(engine.save(decides))
-        result = engine.step(live, np.full((len(live), 1), -1.0))
-        live, states = live[~result.ended], result.states[~result.ended]
-        if not live.size:
-            break
-    episode, step = np.concatenate(decisions).T
-    order = np.lexsort((step, episode))
-    starts = {name: np.concatenate([part[name] for part in saved])[order] for name in saved[0]}
-    tried = _try(engine, paths, episode[order], starts)
-    outcomes = [np.full(len(states), NO_DECISION, np.int8) for states in episodes]
-    for k, t, outcome in zip(episode[order], step[order], tried, strict=True):
-        outcomes[k][t] = outcome
-    return zip(map(np.array, episodes), outcomes, strict=True)
-
-
-def _try(engine: Engine, paths: Sequence[reach.Path], episode: np.ndarray, starts: dict[str, np.ndarray]) -> np.ndarray:
-    """Outcomes (n,) of closing from saved states (n, ...) of episodes (n,), which lie in order, with their paths."""
-    position = np.arange(len(episode)) - np.searchsorted(episode, episode)
-    outcomes = np.full(len(episode), NO_DECISION, np.int8)
-
-    def play(rows: np.ndarray) -> None:
-        scores = _close(engine, [paths[k] for k in episode[rows]], {name: part[rows] for name, part in starts.items()})
-        outcomes[rows] = np.where(scores == task.SUCCESS, SUCCEEDS, FAILS)
-
-    play(np.flatnonzero(position % FIRST_TRIED == 0))
-    before = outcomes[np.arange(len(episode)) - position % FIRST_TRIED]
-    after_row = np.arange(len(episode)) - position % FIRST_TRIED + FIRST_TRIED
-    last = np.searchsorted(episode, episode, side="right")
-    after = np.where(after_row < last, outcomes[np.minimum(after_row, len(episode) - 1)], FAILS)
-    play(np.flatnonzero((outcomes == NO_DECISION) & (before != after)))
-    return np.where(outcomes == NO_DECISION, before, outcomes)
-
-
-def _close(engine: Engine, paths: Sequence[reach.Path], starts: dict[str, np.ndarray]) -> np.ndarray:
-    """Sums of rewards (n,) of episodes that go on from saved states (n, ...) with a hand that closes at full speed."""
-    scores, playing = np.zeros(len(paths)), np.full(engine.slots, -1)
-    waiting = iter(range(len(paths)))
-    while True:
-        free = np.flatnonzero(playing < 0)
-        new = np.array([number for _, number in zip(free, waiting, strict=False)], int)
-        slots = free[: len(new)]
-        if len(new):
-            playing[slots] = new
-            engine.begin(slots, [paths[number] for number in new])
-            engine.load(slots, {name: rows[new] for name, rows in starts.items()})
-        live = np.flatnonzero(playing >= 0)
-        if not live.size:
-            return scores
-        result = engine.step(live, np.ones((len(live), 1)))
-        scores[playing[live]] += result.rewards
-        playing[live[result.ended]] = -1
 
 
 def _digest(settings: Sequence[Setting]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from baselines import openings, pose_features, stopping_trainer
 from baselines.normalise import CLIP
 from dextron_bench import Perceptron, Track, Trainer
+from dextron_bench.experts.openings import EVERY, NEAR
 from dextron_bench.methods.exact import rounded
 from dextron_bench.world import task
 
@@ -94,8 +95,8 @@ class StoppingAgent:
         """Actions (N, 1), -1 or 1, for states (N, 48)."""
         n = len(states)
         self._history.add(states)
-        self._since_near[:n] += (self._since_near[:n] >= 0) | (task.distance(states) < openings.NEAR)
-        decides = (self._since_near[:n] >= 0) & (self._since_near[:n] % openings.EVERY == 0) & ~self._closes[:n]
+        self._since_near[:n] += (self._since_near[:n] >= 0) | (task.distance(states) < NEAR)
+        decides = (self._since_near[:n] >= 0) & (self._since_near[:n] % EVERY == 0) & ~self._closes[:n]
         rows = np.flatnonzero(decides)
         if rows.size:
             self._closes[rows] = self._closing(self._history.features(rows)) > 0.0

@@ -9,10 +9,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, logsigmoid, pad
 
-from baselines import openings, pose_features, snapshot
+from baselines import pose_features, snapshot
 from baselines.networks import Stack
 from baselines.normalise import CLIP, EPSILON
-from baselines.openings import Openings
+from dextron_bench.experts.openings import NO_DECISION, Openings
 from dextron_bench.methods.learners import Arrays
 
 MEMBERS = 5  # Networks of an agent, whose outputs are averaged.
@@ -56,7 +56,7 @@ class Decisions:
     def _of(played: Openings, number: int) -> tuple[np.ndarray, np.ndarray]:
         """Features (d, F) and outcomes (d,) of an opening's decisions."""
         rows = played.rows(number)
-        decided = played.outcomes[rows] != openings.NO_DECISION
+        decided = played.outcomes[rows] != NO_DECISION
         return pose_features.of_episode(played.states[rows].astype(float))[decided], played.outcomes[rows][decided]
 
 

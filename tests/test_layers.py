@@ -34,7 +34,7 @@ LEVELS = {
 SDKS = {  # Packages of others that one place alone imports.
     "rerun": "dextron_bench/recording/",
     "rerun_bindings": "dextron_bench/recording/",
-    "matplotlib": "dextron_bench/scores/figures.py",
+    "matplotlib": "dextron_bench/scores/figures/",
     "minari": "dextron_bench/evaluation/minari_export.py",
     "av": "dextron_bench/recording/film.py",
     "tensorboard": "dextron_bench/tracking/to_tensorboard.py",
@@ -47,6 +47,7 @@ SDKS = {  # Packages of others that one place alone imports.
 TOP = ("dextron_bench/__init__.py", "dextron_bench/__main__.py")  # Above all levels.
 PUBLIC = ("world.gym", "world.suite", "world.model", "world.task", "success.network")  # Public modules.
 BASELINES_ALSO = {  # Private modules that baselines import, and why an outside entrant needs none of them.
+    "experts.openings": "closings tried in forks of the batched engine",
     "methods.exact": "rounding of an output that is not a perceptron's",
     "methods.learners": "the type of named arrays",
     "reaches.reach": "the type of a path",

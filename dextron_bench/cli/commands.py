@@ -7,6 +7,7 @@ from typing import Protocol
 from dextron_bench.cli import (
     check,
     compare,
+    cross_validate,
     data,
     data_export,
     data_synthetic,
@@ -30,6 +31,7 @@ from dextron_bench.cli import (
     success_eval,
     sweep,
     view,
+    windows,
 )
 from dextron_bench.cli import eval as evaluation
 from dextron_bench.cli import list as listing
@@ -47,6 +49,7 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "run": run.Run,
     "eval": evaluation.Eval,
     "sweep": sweep.Sweep,
+    "cross-validate": cross_validate.CrossValidate,
     "leaderboard": (
         "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
         "add a submission to it; play fresh settings.",
@@ -90,6 +93,7 @@ COMMANDS: dict[str, type[Command] | Group] = {
         {"data": success.Data, "train": success.Train, "eval": success_eval.Eval, "explain": success_eval.Explain},
     ),
     "figures": figures.Figures,
+    "windows": windows.Windows,
     "rebuild": rebuild.Rebuild,
     "doctor": doctor.Doctor,
 }

@@ -93,9 +93,9 @@ class Compare:
             return compare_pairs.compare(self, methods)
         result = comparison.compare(*methods)
         if self.into is not None:
-            from dextron_bench.scores import figures
+            from dextron_bench.scores.figures import differences
 
-            figures.differences(result, self.into)
+            differences.differences(result, self.into)
         print_json(as_dict(result)) if self.json else _print(result)
         return DIFFERS if self.fail_if_worse and result.score.is_worse else DONE
 

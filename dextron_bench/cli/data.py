@@ -83,7 +83,7 @@ class Info:
                 rows = table[[*by, "reaches", "duration", "length", "speed"]].itertuples(index=False)
                 print_table(title, columns, rows)
         if self.picture:
-            from dextron_bench.scores.figures import reach_paths
+            from dextron_bench.scores.figures.reaches import reach_paths
 
             reach_paths(source, self.picture)
         return DONE

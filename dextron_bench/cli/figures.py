@@ -51,21 +51,22 @@ class Figures:
     def _reaches(self) -> Iterator[Path]:
         from dextron_bench.experts import database
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.scores import figures
+        from dextron_bench.scores.figures import reaches
         from dextron_bench.splits.near_equal import SETTING
 
         source = open_source(self.reaches)
         solved = database.load_shipped(self.reaches)[0].query("score == 20")
         solved = solved.drop_duplicates(SETTING).head(self.rows)
-        figures.start_points(source, solved, self._file("fig3a"))
+        reaches.start_points(source, solved, self._file("fig3a"))
         yield self._file("fig3a")
-        figures.reach_paths(source, self._file("fig3b"))
+        reaches.reach_paths(source, self._file("fig3b"))
         yield self._file("fig3b")
 
     def _learning(self) -> Iterator[Path]:
         from dextron_bench.leaderboard import build
         from dextron_bench.runs import result_files
-        from dextron_bench.scores import figures, standings
+        from dextron_bench.scores import standings
+        from dextron_bench.scores.figures.training import learning_curves
 
         rows = standings.table(result_files.results(self.results)) if self.results.exists() else None
         for name, cloned, epochs in (("fig4a", False, "epochs of 1,000 frames"), ("fig4c", True, "epochs of cloning")):
@@ -74,22 +75,23 @@ class Figures:
             if curves and rows is not None:
                 source_rows = rows[rows["reaches"] == self.reaches]
                 constant = source_rows.head(0) if cloned else source_rows
-                figures.learning_curves(curves, constant, self._file(name), epochs)
+                learning_curves(curves, constant, self._file(name), epochs)
                 yield self._file(name)
 
     def _success(self) -> Iterator[Path]:
         from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.scores import figures
+        from dextron_bench.scores.figures import episodes as drawn_episodes
+        from dextron_bench.scores.figures.training import success_curve
         from dextron_bench.splits.loading import load_split
         from dextron_bench.success import exemplars, network
 
-        figures.success_curve(network.training_info(self.reaches)["curve"], self._file("fig4b"))
+        success_curve(network.training_info(self.reaches)["curve"], self._file("fig4b"))
         yield self._file("fig4b")
         files = [file for file in weights.all_shipped(self.reaches) if file.stem == "seed0"]
         policies = {file.parts[-3]: weights.load_agent_from_file(file) for file in files}
         model, cases = network.shipped_model(self.reaches), load_split(self.reaches, "test").cases[: self.settings]
         episodes = exemplars.play_and_predict(model, open_source(self.reaches), cases, policies, self.threads)
         chosen = exemplars.choose(episodes)
-        figures.ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self._file("fig5"))
+        drawn_episodes.ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self._file("fig5"))
         yield self._file("fig5")

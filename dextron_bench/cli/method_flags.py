@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-COMMANDS = ("run", "eval", "sweep")  # They take the settings of a method.
+COMMANDS = ("run", "eval", "sweep", "cross-validate")  # They take the settings of a method.
 FIELD = "method_settings"  # Of these commands, for the settings. Its name is no flag, and methods have others.
 ALL, METHOD = "--all", "--method"
 

@@ -35,6 +35,12 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[obje
     print(captured.get(), end="")
 
 
+def print_markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Prints a table as Markdown on stdout."""
+    for row in (columns, ["---"] * len(columns), *rows):
+        print(f"| {' | '.join(printable(cell) for cell in row)} |")
+
+
 def print_warning(text: str) -> None:
     """Prints one line on stderr; text of a stranger shows no control characters and is cut."""
     print(f"dextron-bench: {printable_line(text)}", file=sys.stderr)

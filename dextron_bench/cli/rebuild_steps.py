@@ -92,7 +92,7 @@ SIM_QUICK = f"{WEIGHTS}/sim-0.1-quick/minjerk/*"
 
 
 def _success(reaches: str, rows: int, epochs: int) -> Step:
-    """The success model, trained on episodes of the experts, of a policy that often fails, and of one that rarely does."""
+    """The success model, trained on episodes of the experts and of policies that fail often and seldom."""
     policies = [f"{WEIGHTS}/{label}/{reaches}/*.safetensors" for label in ("bc-quick", "rlil-0.1-quick")]
     data = f"success data --reaches {reaches} --rows {rows} --policies {' '.join(policies)} --runs {{runs}}"
     train = f"success train --reaches {reaches} --epochs {epochs} --runs {{runs}}"
@@ -101,7 +101,7 @@ def _success(reaches: str, rows: int, epochs: int) -> Step:
 
 
 def _show(method: str, reaches: str = "synthetic") -> str:
-    return f"eval --method {method} --preset quick --reaches {reaches} --seed 0 --split test --runs {{runs}}/show"
+    return f"eval --method {method} --reaches {reaches} --seed 0 --split test --runs {{runs}}/show"
 
 
 STEPS: tuple[Step, ...] = (
@@ -118,9 +118,9 @@ STEPS: tuple[Step, ...] = (
     _quick("sor", "sor", "real", SEEDS, (SIM_QUICK,)),
     *(_quick(label, flags, "synthetic") for label, flags in LEARNERS.items()),
     _quick("sor", "sor", "synthetic", needs=(SIM_QUICK,)),
+    *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
-    *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
     _run("sor", "sor", "real", SEEDS, (SIM,)),
     _success("real", 400_000, 15),
     _success("synthetic", 400_000, 15),
@@ -129,18 +129,26 @@ STEPS: tuple[Step, ...] = (
         "recordings",
         (
             "run --method exp --split test --no-floors --runs {runs}/show",
-            *map(_show, ("bc", "rl --hold 40", "rlil --dur 0.1", "rlil --dur 0.3", "stopping", "sor")),
-            _show("sim", "minjerk"),
+            *(_show(f"{LEARNERS[label]} --preset quick") for label in ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")),
+            _show("sor --preset quick"),
+            _show("stopping"),
+            _show("sim --preset quick", "minjerk"),
             "recordings choose --runs {runs}/show --into recordings",
         ),
-        needs=(SPLITS, f"{WEIGHTS}/*-quick/*/seed0.safetensors", f"{DATA}/success-synthetic.safetensors"),
+        needs=(
+            *(SPLITS, f"{WEIGHTS}/*-quick/*/seed0.safetensors", f"{WEIGHTS}/stopping/synthetic/seed0.safetensors"),
+            f"{DATA}/success-synthetic.safetensors",
+        ),
         makes=("recordings/*.rrd",),
     ),
     Step(
         "figures",
-        ("figures --reaches real --into docs/pictures",),
-        needs=(f"{DATA}/*", "leaderboard/results/*/*/*/*.json"),
-        makes=("docs/pictures/fig*.png", "docs/pictures/h*.png"),
+        (
+            "figures --reaches real --into docs/pictures",
+            "windows reflex stopping --reaches real --into docs/pictures/windows-real.png",
+        ),
+        needs=(f"{DATA}/*", "leaderboard/results/*/*/*/*.json", f"{WEIGHTS}/stopping/real/seed0.safetensors"),
+        makes=("docs/pictures/fig*.png", "docs/pictures/h*.png", "docs/pictures/windows-real.png"),
     ),
     Step(
         "fresh",

@@ -241,11 +241,11 @@ def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
 def _draw(entries: Sequence[Entry], file: Path) -> None:
     import pandas as pd
 
-    from dextron_bench.scores import figures
+    from dextron_bench.scores.figures.training import learning_curves
 
     curves = {
         entry.name: {seed: pd.DataFrame(points) for seed, points in entry.curves.items()}
         for entry in entries
         if entry.curves
     }
-    figures.learning_curves(curves, pd.DataFrame(columns=["split", "method", "return"]), file)
+    learning_curves(curves, pd.DataFrame(columns=["split", "method", "return"]), file)

@@ -102,7 +102,7 @@ class Explain:
     def __call__(self) -> int:
         from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
-        from dextron_bench.scores import figures
+        from dextron_bench.scores.figures.episodes import ridges
         from dextron_bench.splits.loading import load_split
         from dextron_bench.success import exemplars
 
@@ -111,7 +111,7 @@ class Explain:
         policies = {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
         chosen = exemplars.choose(exemplars.play_and_predict(model, source, cases, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
-        figures.ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self.into)
+        ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self.into)
         _print_exemplars(chosen, cases)
         if missing := [title for kind, title in exemplars.KINDS.items() if kind not in chosen]:
             print(f"dextron-bench: no episode of this kind: {'; '.join(missing)}", file=sys.stderr)

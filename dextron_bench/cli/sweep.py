@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -28,6 +29,8 @@ class Sweep:
     and tries failed trials again. No test split is played; `run` plays them for the winner.
 
     Example: dextron-bench sweep --method mine.py:Mine --grid near=0.04,0.06,0.08 --seed 0 1 2
+
+    Example: dextron-bench sweep --method stopping --grid settings=100,200,400 --reaches real --into scaling.png
     """
 
     method: str = ""
@@ -52,6 +55,8 @@ class Sweep:
     """The name of the sweep; by default the method's name and a hash of what is asked."""
     show: bool = False
     """Run nothing: show this sweep, the one of --name, or a list of all."""
+    into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
+    """Also draw the scores on `val` against the setting that varies, which has numbers, into this file."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     threads: int = 0
@@ -65,7 +70,7 @@ class Sweep:
     method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
-        from dextron_bench.sweeps import execution
+        from dextron_bench.sweeps import execution, space
         from dextron_bench.sweeps.sweep import BadSweep, SweepFile, default_name
 
         if self.show and not (self.grid or self.search):
@@ -74,6 +79,7 @@ class Sweep:
             raise BadSweep("give --method, or --show to see the sweeps in the folder of runs")
         question = self._question()
         file = SweepFile.of(self.runs, self.name or default_name(question))
+        self._check_picture(space.as_json(question.space))
         if not self.show:
             count = question.trials(self.trials)
 
@@ -109,12 +115,27 @@ class Sweep:
 
         content = file.read()
         trials = [Trial.from_json(trial) for trial in content["trials"]]
+        if self.into is not None:
+            self._check_picture(content["question"]["space"])
+            sweep_output.draw(content, trials, self.into)
         if self.json:
             print_json(content)
         else:
             sweep_output.print_trials(file, content, trials, self.runs)
             sweep_output.print_winner(content, trials, self.runs)
         return EPISODES_FAILED if any(trial.failed or trial.state == FAILED for trial in trials) else DONE
+
+    def _check_picture(self, space: Mapping[str, Any]) -> None:
+        """Raises UnknownFormat or BadSweep if the scores over this space cannot be drawn into the file."""
+        if self.into is None:
+            return
+        from dextron_bench.scores.figures import pictures
+        from dextron_bench.sweeps.sweep import BadSweep
+
+        pictures.check_format(self.into)
+        values = [value for part in space.values() for value in part.get("values", ())]
+        if len(space) != 1 or not all(type(value) in (int, float) for value in values):
+            raise BadSweep("--into draws the scores against one setting with numbers; vary one, as in near=0.04,0.06")
 
     def _show_all(self) -> int:
         """Prints a row for each sweep."""

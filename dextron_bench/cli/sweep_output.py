@@ -51,6 +51,22 @@ def print_winner(content: Mapping[str, Any], trials: list[Trial], runs: Path) ->
     print(f"On the splits that rank: dextron-bench run {' '.join(words)}")
 
 
+def draw(content: Mapping[str, Any], trials: list[Trial], file: Path) -> None:
+    """Draws the scores of the trials that are done against the only setting that varies; raises OSError."""
+    from dextron_bench.scores.figures import sweeps
+
+    question, (setting,) = content["question"], content["question"]["space"]
+    points = [
+        sweeps.Point(float(trial.settings[setting]), trial.returns, trial.successes)
+        for trial in trials
+        if trial.returns and trial.successes
+    ]
+    seeds = " ".join(map(str, question["seeds"]))
+    title = f"{question['method']} on val of {question['reaches']} reaches, seeds {seeds}"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    sweeps.scaling(points, setting, title, file)
+
+
 def _state(trial: Trial) -> str:
     """The state of a trial, with its error, and the number of episodes in which the agent raised one."""
     from dextron_bench.sweeps.trial import STOPPED

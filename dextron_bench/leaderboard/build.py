@@ -34,7 +34,7 @@ def build(board: Path) -> list[Path]:
     """
     from dextron_bench.leaderboard import page
     from dextron_bench.leaderboard.highlights import FOLDER
-    from dextron_bench.scores import figures
+    from dextron_bench.scores.figures import training
 
     results = _results_of_this_world(board / RESULTS)
     rows = standings.table(results)
@@ -47,7 +47,7 @@ def build(board: Path) -> list[Path]:
     readme.insert(files[1], "\n".join(readme.sections(table, set(curves))))
     for reaches, by_method in curves.items():
         files.append(board / readme.picture(reaches))
-        figures.learning_curves(by_method, rows[rows["reaches"] == reaches], files[-1])
+        training.learning_curves(by_method, rows[rows["reaches"] == reaches], files[-1])
     files.append(board / page.FILE)
     text = page.document(rows, results, curves, board.resolve().parent / FOLDER)
     atomic.write_atomically(files[-1], lambda part: part.write_text(text, encoding="utf-8"))

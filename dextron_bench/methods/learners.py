@@ -10,7 +10,7 @@ curve and picks the best snapshot of the weights. A learner owns its networks an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
@@ -25,6 +25,10 @@ if TYPE_CHECKING:  # The process of an isolated agent imports this module, and m
 Arrays = dict[str, np.ndarray]  # Arrays by name, the content of a safetensors file.
 
 
+def _report_nothing(done: int, total: int, note: str) -> None:
+    """Shows no progress."""
+
+
 @dataclass(frozen=True, slots=True)
 class Track:
     """What a learner trains with.
@@ -32,7 +36,8 @@ class Track:
     `source` gives the reaches, and `cases` are the rows of `train`: settings with their experts. `cache` is a folder
     for files that can be made again, such as demonstrations; several learners may share it. `threads` is the number of
     threads of the simulation (0: one per processor); results must not depend on it. `device` is the PyTorch device of
-    the networks.
+    the networks. `report` receives how far a learner is that prepares something for minutes before its first epoch:
+    the number of units done, their number, and what is being prepared.
     """
 
     source: Source
@@ -40,6 +45,7 @@ class Track:
     cache: Path
     threads: int = 0
     device: str = "cpu"
+    report: Callable[[int, int, str], None] = _report_nothing
 
 
 class Trainer(Protocol):

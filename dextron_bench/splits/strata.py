@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded import parsing
 from dextron_bench.splits.loading import Split, known_splits, load_split
 from dextron_bench.splits.tracks import PLUS
+from dextron_bench.storage import hashing
 from dextron_bench.world import task
 
 SUBJECT, REGION = ("subject",), ("ring", "angle")  # What `by_stratum` groups by.
@@ -28,6 +30,19 @@ def strata(split: Split) -> pd.DataFrame:
         source = sources.open_source(split.reaches)
         rows = [(stratum.subject, stratum.ring, stratum.angle) for stratum in map(source.stratum, names)]
     return pd.DataFrame(rows, columns=["subject", "ring", "angle"])
+
+
+def by_subject(split: Split, subject: str) -> tuple[Split, Split]:
+    """The rows of a split with a subject's reaches, and all other rows, each with a digest of its own.
+
+    The split has no other bottles. Raises UnknownReach.
+    """
+    subjects = strata(split)["subject"].to_numpy()
+    parts = []
+    for word, chosen in (("with", subjects == subject), ("without", subjects != subject)):
+        cases = tuple(case for case, is_in in zip(split.cases, chosen, strict=True) if is_in)
+        parts.append(replace(split, cases=cases, digest=hashing.digest(f"{split.digest} {word} {subject}".encode())))
+    return parts[0], parts[1]
 
 
 def shipped_strata(reaches: str, name: str, digest: str) -> pd.DataFrame | None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from dextron_bench.storage.folders import visible
 
 SEED = "seed"  # The folder of seed 3 is `seed3`.
+WITHOUT = "without"  # In the folder of runs: without/<subject>/<label>/<reaches>/seed<k>.
 TRACKING = "tracking-"  # The files of trackers of `training-0+1` are in `tracking-0+1`.
 
 
@@ -67,6 +68,11 @@ class RunFolder:
         return self.path / "curve.json"
 
     @property
+    def left_out(self) -> Path:
+        """The file of the scores on the settings of the subject that the training has left out."""
+        return self.path / "left-out.json"
+
+    @property
     def episodes(self) -> Path:
         """The file of the table of episodes."""
         return self.path / "episodes.parquet"
@@ -104,6 +110,11 @@ class RunFolder:
 def source_folder(runs: Path, label: str, reaches: str) -> Path:
     """The folder of a method's runs on one source of reaches."""
     return runs / label / reaches
+
+
+def runs_without(runs: Path, subject: str) -> Path:
+    """The folder of runs whose training has left out a subject."""
+    return runs / WITHOUT / subject
 
 
 def run_folders(runs: Path, label: str = "*") -> list[RunFolder]:

@@ -183,6 +183,7 @@ SWEEP = entries(
         **dict.fromkeys(("choice", "flags"), text),
     }
 )
+LEFT_OUT = entries({"depends on": OBJECT, "scores": list_of(RETURN, 1), "failed": COUNT})
 PIECE = entries({"name": text, "depends on": OBJECT, "code": text, "files": map_of(text), "provenance": PROVENANCE})
 FINDING = entries({"done": text, "problems": list_of(text), "actions": map_of(list_of(text))})
 NOTES = entries({"tags": list_of(text), "note": text})

@@ -1,1 +1,1 @@
-"""Sweeps: several settings of a method, each as an ordinary run, compared on `val`."""
+"""Sweeps: several settings of a method, each as an ordinary run, compared on `val`; and cross-validation by subject."""

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dextron_bench.methods import registry
 from dextron_bench.methods.learners import Learner, Track
 from dextron_bench.reaches import sources
-from dextron_bench.splits.loading import load_split
+from dextron_bench.splits import strata
+from dextron_bench.splits.loading import Split, load_split
 from dextron_bench.storage import atomic, folder_config, schemas, tensors
 from dextron_bench.storage.progress import Progress, no_progress
-from dextron_bench.storage.run_folder import RunFolder, source_folder
+from dextron_bench.storage.run_folder import RunFolder, runs_without, source_folder
 from dextron_bench.training import loop, timing
 from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.training.learning_curve import Curve
@@ -24,13 +25,18 @@ class NoDevice(ValueError):
 
 @dataclass(frozen=True)
 class TrainingJob:
-    """The training of a learner on a source of reaches, for any seeds."""
+    """The training of a learner on a source of reaches, for any seeds.
+
+    With `without`, a subject, the rows of `train` and `val` with that subject's reaches are left out, and the folders
+    are below `<runs>/without/<subject>`.
+    """
 
     learner: Learner
     reaches: str
     runs: Path
     threads: int = 0
     device: str = "cpu"
+    without: str = ""
 
     def groups(self, seeds: Sequence[int]) -> list[tuple[int, ...]]:
         """The seeds that need training, in the groups that train together; finished groups come first."""
@@ -48,7 +54,7 @@ class TrainingJob:
         for seed in seeds:
             folder_config.check(self.run_folder(seed).path, registry.run_config(self.learner, self.reaches, seed))
         for group in self.groups(seeds):
-            track, val = self.track(), load_split(self.reaches, "val")
+            track, val = replace(self.track(), report=report), self._split("val")
             for seed in group:
                 config = registry.run_config(self.learner, self.reaches, seed)
                 folder_config.write_or_check(self.run_folder(seed).path, config)
@@ -59,13 +65,13 @@ class TrainingJob:
 
     def track(self) -> Track:
         """What the learner trains with; raises NoDevice, UnknownSplit, MissingData."""
-        cases = load_split(self.reaches, "train").cases
+        cases = self._split("train").cases
         source = sources.open_source(self.reaches)
         return Track(source, cases, self.runs / "cache", self.threads, _device(self.device))
 
     def run_folder(self, seed: int) -> RunFolder:
         """The folder of a seed's run."""
-        return RunFolder.of(self.runs, self.learner.label, self.reaches, seed)
+        return RunFolder.of(self._runs, self.learner.label, self.reaches, seed)
 
     def training_folder(self, group: Sequence[int]) -> Path:
         """The folder in which a group of seeds trains."""
@@ -83,7 +89,16 @@ class TrainingJob:
 
     @property
     def _source_folder(self) -> Path:
-        return source_folder(self.runs, self.learner.label, self.reaches)
+        return source_folder(self._runs, self.learner.label, self.reaches)
+
+    @property
+    def _runs(self) -> Path:
+        return runs_without(self.runs, self.without) if self.without else self.runs
+
+    def _split(self, name: str) -> Split:
+        """A split, without the rows of the subject that is left out."""
+        split = load_split(self.reaches, name)
+        return strata.by_subject(split, self.without)[1] if self.without else split
 
     def _finished(self) -> list[tuple[int, ...]]:
         """The groups whose epochs are all done."""
@@ -98,6 +113,7 @@ class TrainingJob:
         frames = schemas.read_about(checkpoints.snapshot(last, seed), schemas.SNAPSHOT).get("frames")
         about = schemas.read_about(snapshot, schemas.SNAPSHOT)
         about |= {"best_epoch": best, "epochs": last, "frames": frames and int(frames)}
+        about |= {"without": self.without} if self.without else {}
         del about["epoch"]
         atomic.write_json(run.curve, {"split": "val", "points": curve.points(seed)})
         tensors.write(run.weights, tensors.read(snapshot), about | {"reaches": self.reaches})

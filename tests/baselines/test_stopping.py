@@ -11,32 +11,15 @@ import torch
 from torch.testing import assert_close
 
 from baselines import openings, pose_features, stopping_trainer
-from baselines.openings import FAILS, NO_DECISION, SUCCEEDS, Openings
 from baselines.stopping import BadNumber, Stopping, StoppingAgent
 from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.experts.openings import SUCCEEDS, Openings
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import Arrays, Track
 from dextron_bench.world import model, task
-from dextron_bench.world.engine import Engine
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
-
-
-class ClosesAt:
-    """Opens until a step, then closes at full speed."""
-
-    def __init__(self, step: int) -> None:
-        self._closing_step, self._step = step, -1
-
-    def reset(self, episodes: np.ndarray) -> None:
-        """Rows begin a new episode; all begin together."""
-        self._step = -1
-
-    def act(self, states: np.ndarray) -> np.ndarray:
-        """Actions (N, 1), -1 or 1."""
-        self._step += 1
-        return np.full((len(states), 1), 1.0 if self._step >= self._closing_step else -1.0)
 
 
 @pytest.fixture(scope="module")
@@ -45,51 +28,15 @@ def played() -> Openings:
     return openings.joined(openings.play(SOURCE, SETTINGS, threads=1))
 
 
-def test_an_outcome_is_the_end_of_an_episode_that_closes_there(played: Openings):
-    """All decisions that were tried are played again, each from its start by an agent that closes at that step."""
-    for number in (0, 1):
-        outcomes = played.outcomes[played.rows(number)]
-        steps = np.flatnonzero(outcomes != NO_DECISION)
-        tried = steps[:: openings.FIRST_TRIED]
-        scores = [dict(rollout(ClosesAt(step), SOURCE, [CASES[number]], 1, 1))[0].score for step in tried]
-        assert [score == task.SUCCESS for score in scores] == (outcomes[tried] == SUCCEEDS).tolist()
-    assert set(played.outcomes) == {NO_DECISION, FAILS, SUCCEEDS}
-
-
-def test_decisions_begin_near_the_bottle_and_come_every_second_step(played: Openings):
-    for number in range(len(played)):
-        rows = played.rows(number)
-        steps = np.flatnonzero(played.outcomes[rows] != NO_DECISION)
-        distances = task.distance(played.states[rows].astype(float))
-        assert steps[0] == np.argmax(distances < openings.NEAR)
-        assert set(np.diff(steps)) == {openings.EVERY}
-
-
-def test_decisions_between_a_success_and_a_failure_are_tried_and_others_taken_to_be_equal(
-    monkeypatch: pytest.MonkeyPatch,
-):
-    """Two episodes of 8 and 5 decisions; those with the marks + succeed. Every third one is tried first."""
-    truth = np.array([char == "+" for char in "--++++-+++-++"])
-    tried: list[int] = []
-
-    def close(engine: Engine, paths: list, starts: Arrays) -> np.ndarray:
-        tried.extend(starts["row"].tolist())
-        return np.where(truth[starts["row"]], 20.0, 3.0)
-
-    monkeypatch.setattr(openings, "_close", close)
-    episode = np.repeat([0, 1], [8, 5])
-    outcomes = openings._try(None, ["a", "b"], episode, {"row": np.arange(13)})  # type: ignore[arg-type]
-    assert tried == [0, 3, 6, 8, 11, 1, 2, 4, 5, 12]
-    # Row 7 follows the failure of row 6, and nothing is tried after it; rows 9 and 10 lie between two successes.
-    assert "".join("-+"[outcome] for outcome in outcomes) == "--++++--+++++"
-
-
 def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
     played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    everything, first_reach = Track(SOURCE, CASES * 2, tmp_path, threads=1), SETTINGS[0].reach
+    reported: list[tuple[int, int]] = []
+    everything = Track(SOURCE, CASES * 2, tmp_path, 1, report=lambda done, total, note: reported.append((done, total)))
+    first_reach = SETTINGS[0].reach
     first = openings.load(everything)
     assert len(first) == len(CASES)  # Each setting counts once.
+    assert reported == [(0, 5), (0, 5)]  # Both reaches are played together.
     for name in ("states", "outcomes", "starts"):
         np.testing.assert_array_equal(getattr(first, name), getattr(played, name))
     monkeypatch.setattr(openings, "play", None)

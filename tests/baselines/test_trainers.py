@@ -14,6 +14,7 @@ from baselines.cycle import Cycle
 from baselines.dagger import Aggregation
 from baselines.demonstrations import load
 from baselines.policy import MeanAgent
+from baselines.rlpd import Rlpd
 from baselines.schedule import Exploration, Schedule
 from baselines.stopping import Stopping, StoppingAgent
 from dextron_bench.experts.policies import Case, Expert
@@ -22,7 +23,7 @@ from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 SCHEDULE = Schedule(epochs=4, warm_start=60, period=1)
-KINDS = ("rl", "held", "rlil", "bc", "dagger", "stopping")
+KINDS = ("rl", "held", "rlil", "rlpd", "bc", "dagger", "stopping")
 
 
 @pytest.fixture(autouse=True)
@@ -30,6 +31,7 @@ def short_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Shortens epochs to 80 frames, 2 episodes, or 5 updates of BC, DAGGER or STOPPING."""
     monkeypatch.setattr(cycle, "FRAMES", 80)
     monkeypatch.setattr("baselines.bc.STEPS", 5)
+    monkeypatch.setattr("baselines.rlpd.WARM_START", 60)
     monkeypatch.setattr("baselines.dagger.EPISODES", 2)
     monkeypatch.setattr(stopping_trainer, "UPDATES", 5)
 
@@ -42,6 +44,8 @@ def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: 
         return Aggregation(track, load(track), seeds)
     if kind == "stopping":
         return Stopping().trainer(track, seeds)
+    if kind == "rlpd":
+        return Rlpd(critics=3, updates=2, batch=16).trainer(track, seeds)
     if kind == "held":
         return Cycle(track, seeds, schedule, 9, Exploration(hold=7, share=0.5), critics=2)
     return Cycle(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)

@@ -186,7 +186,8 @@ def test_every_error_has_its_exit_code(
 
 def test_a_source_is_drawn(small_release: SmallRelease, tmp_path: Path):
     from dextron_bench.reaches.setting import ReachSource
-    from dextron_bench.scores.figures import UnknownFormat, reach_paths
+    from dextron_bench.scores.figures.pictures import UnknownFormat
+    from dextron_bench.scores.figures.reaches import reach_paths
 
     reaches = release.read(small_release.zip(), release.Manifest.load(small_release.manifest))
     reach_paths(ReachSource("real", reaches), tmp_path / "reaches.png")

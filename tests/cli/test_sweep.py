@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from dextron_bench.cli import main
+from dextron_bench.scores.figures import sweeps
 from dextron_bench.storage import atomic, folders
 from dextron_bench.sweeps import optuna_search
 from tests.helpers import tiny_benchmark, tiny_training
@@ -93,6 +94,19 @@ def test_the_best_of_a_grid_is_chosen_on_val_alone(here: Path, capsys: pytest.Ca
     assert command in capsys.readouterr().out
 
 
+def test_the_scores_are_drawn_against_the_setting(here: Path, monkeypatch: pytest.MonkeyPatch):
+    drawn: list[list[sweeps.Point]] = []
+    draw = sweeps.scaling
+    monkeypatch.setattr(sweeps, "scaling", lambda points, *about: (drawn.append(list(points)), draw(points, *about)))
+    words = ["--grid", f"near=0.95,{SOLVES},2", "--name", "curve"]  # The method refuses the last one.
+    assert main.main(sweep(*words, "--into", "pictures/curve.svg")) == 3
+    assert "success [%]" in Path("pictures/curve.svg").read_text()
+    assert main.main(["sweep", "--show", "--name", "curve", "--into", "again.svg"]) == 3
+    assert Path("again.svg").read_bytes() == Path("pictures/curve.svg").read_bytes()
+    values = [(point.value, point.returns.mean == 20.0) for point in drawn[1]]
+    assert values == [(0.95, False), (float(SOLVES), True)]
+
+
 def test_an_interrupted_sweep_continues_with_equal_results(here: Path, monkeypatch: pytest.MonkeyPatch):
     """It is interrupted at every tenth file that it writes."""
 
@@ -159,6 +173,8 @@ def test_a_training_is_stopped_early(here: Path, monkeypatch: pytest.MonkeyPatch
         (["--grid", "near=0.1", "--sampler", "tpe"], "--sampler goes with --search"),
         (["--search", "near=0.1..0.2", "--trials", "0"], "--trials is 1 or more"),
         (["--grid", "near=0.1", "--name", "../up"], "is no name of a sweep"),
+        (["--grid", "near=0.1", "--into", "curve.gif"], "no picture format '.gif'"),
+        (["--grid", "near=0.1", "gain=1.1", "--into", "curve.png"], "--into draws the scores against one setting"),
         (["--name", "nix", "--show"], "no sweep is called 'nix'; the folder has none"),
     ],
 )

@@ -77,7 +77,9 @@ def test_filling_again_changes_nothing(board: Path):
     assert documents.fill([file], board) == []
 
 
-@pytest.mark.parametrize("key", ["nonsense", "results synthetic", "other real test return", "mine real test speed", "search real speed"])
+@pytest.mark.parametrize(
+    "key", ["nonsense", "results synthetic", "other real test return", "mine real test speed", "search real speed"]
+)
 def test_a_key_that_names_nothing_is_refused_and_the_file_stays(board: Path, key: str):
     with pytest.raises(documents.UnknownNumber, match="names no number"):
         filled(board, number(key))

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from dextron_bench.scores import comparison, figures
+from dextron_bench.evaluation.closing_windows import Choice, Window
+from dextron_bench.scores import comparison
+from dextron_bench.scores.figures import differences, episodes, pictures, training
 
 
 @pytest.mark.parametrize("suffix", [".pdf", ".svg", ".png"])
@@ -18,7 +20,7 @@ def test_equal_comparisons_give_equal_bytes(suffix: str, tmp_path: Path, monkeyp
     files = [tmp_path / f"{name}{suffix}" for name in ("today", "tomorrow")]
     for day, file in enumerate(files):
         monkeypatch.setenv("SOURCE_DATE_EPOCH", str(86_400 * day))  # Matplotlib takes its date from here.
-        figures.differences(comparison.compare(a, b), file)
+        differences.differences(comparison.compare(a, b), file)
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
@@ -32,11 +34,30 @@ def test_a_picture_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(Figure, "savefig", write_half)
     point: dict[str, float] = dict.fromkeys(("epoch", "loss", "accuracy", "test_loss", "test_accuracy"), 1.0)
     with pytest.raises(OSError, match="No space left") as caught:
-        figures.success_curve([point], picture)
+        training.success_curve([point], picture)
     assert caught.value.filename == str(picture)
     assert [(file.name, file.read_bytes()) for file in tmp_path.iterdir()] == [("picture.png", b"old")]
 
 
 def test_an_unknown_format_lists_the_known_ones(tmp_path: Path):
-    with pytest.raises(figures.UnknownFormat, match=r"difference\.gif: .*'\.gif'.*\.pdf, \.png, \.svg"):
-        figures.success_curve([{"epoch": 1.0}], tmp_path / "difference.gif")
+    with pytest.raises(pictures.UnknownFormat, match=r"difference\.gif: .*'\.gif'.*\.pdf, \.png, \.svg"):
+        training.success_curve([{"epoch": 1.0}], tmp_path / "difference.gif")
+
+
+def test_windows_are_drawn_also_for_settings_that_never_work_and_for_hands_that_never_came_near(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    never = np.zeros(0)
+    windows = [
+        Window(np.array([1.0, 1.04, 1.08]), np.array([False, True, False])),
+        Window(np.array([2.0]), np.array([False])),
+        Window(never, never.astype(bool)),
+    ]
+    choices = {"rule": [Choice(1.04, True), Choice(2.0, False), Choice(np.nan, False)]}
+    drawn: list[Figure] = []
+    monkeypatch.setattr(episodes, "save", lambda figure, file, dpi: drawn.append(figure))
+    episodes.windows(windows, choices, "title", tmp_path / "windows.svg")
+    (axes,) = drawn[0].axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["0", "1", "2"]
+    marks = [(line.get_xdata()[0], line.get_markerfacecolor()) for line in axes.lines[:2]]  # type: ignore[index]
+    assert marks == [(pytest.approx(0.04), "C0"), (0.0, "white")]

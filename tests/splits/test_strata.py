@@ -10,7 +10,7 @@ import pytest
 
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import all_splits, load_split
-from dextron_bench.splits.strata import REGION, SUBJECT, by_stratum, start_regions, strata
+from dextron_bench.splits.strata import REGION, SUBJECT, by_stratum, by_subject, start_regions, strata
 
 
 @pytest.mark.parametrize(("reaches", "split"), [(r, s) for r, s in all_splits() if s == "test"])
@@ -33,8 +33,8 @@ def test_a_group_has_the_means_over_seeds_and_rows():
     """Rows 0 and 2 belong to one subject: seed 0 scores 20 and 10, seed 1 scores 0 and 20."""
     rows = pd.DataFrame({"subject": ["x", "y", "x"], "ring": [0, 0, 3], "angle": [1, 1, 2]})
     scores = np.array([[20.0, 4.0, 10.0], [0.0, 4.0, 20.0]])
-    by_subject = by_stratum(scores, rows, SUBJECT)
-    assert by_subject.to_dict("list") == {
+    of_subjects = by_stratum(scores, rows, SUBJECT)
+    assert of_subjects.to_dict("list") == {
         "subject": ["x", "y"],
         "rows": [2, 1],
         "return": [12.5, 4.0],
@@ -55,3 +55,15 @@ def test_regions_are_numbered_by_ring_then_angle():
 @pytest.mark.parametrize(("name", "digest"), [("test", "0" * 64), ("nowhere", "0" * 64)])
 def test_a_split_that_does_not_ship_has_no_regions(name: str, digest: str):
     assert start_regions("real", name, digest) is None
+
+
+def test_a_subject_is_separated_from_the_others_row_by_row():
+    """The first two digits of a recorded reach name its subject."""
+    split = load_split("real", "val")
+    subject = split.cases[0].setting.reach[:2]
+    held_out, others = by_subject(split, subject)
+    assert {case.setting.reach[:2] for case in held_out.cases} == {subject}
+    assert subject not in {case.setting.reach[:2] for case in others.cases}
+    assert list(held_out.cases) == [case for case in split.cases if case.setting.reach.startswith(subject)]
+    assert len(held_out.cases) + len(others.cases) == len(split.cases)
+    assert len({split.digest, held_out.digest, others.digest}) == 3

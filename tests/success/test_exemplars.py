@@ -11,7 +11,8 @@ from dextron_bench.evaluation.diagnosis import Diagnosis
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.scores import figures
+from dextron_bench.scores.figures import pictures
+from dextron_bench.scores.figures.episodes import ridges
 from dextron_bench.success.exemplars import KINDS, PredictedEpisode, choose
 from dextron_bench.success.network import GRID
 
@@ -62,8 +63,8 @@ def test_a_step_is_correct_if_the_model_predicts_the_outcome():
 
 def test_the_picture_is_drawn_for_episodes_of_any_length(tmp_path: Path):
     long = predicted("p", "solved", [0.9] * 200, list(np.linspace(0, 1, 200)))
-    figures.ridges({"one": EXPERT, "two": long}, tmp_path / "ridges.png")
+    ridges({"one": EXPERT, "two": long}, tmp_path / "ridges.png")
     assert (tmp_path / "ridges.png").stat().st_size > 10_000
-    with pytest.raises(figures.UnknownFormat):
-        figures.ridges({"one": EXPERT}, tmp_path / "ridges.txt")
+    with pytest.raises(pictures.UnknownFormat):
+        ridges({"one": EXPERT}, tmp_path / "ridges.txt")
     assert len(GRID) == EXPERT.predictions.curves.shape[1]

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
+from dextron_bench.methods.learners import Track, Trainer
+from dextron_bench.splits import strata
 from dextron_bench.storage import tensors
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.training import jobs
@@ -90,3 +95,29 @@ def test_a_device_that_the_machine_does_not_have_is_refused(job: TrainingJob, mo
     assert TrainingJob(QUICK, "synthetic", job.runs, device="auto").track().device == "cpu"
     with pytest.raises(NoDevice, match="this machine has no CUDA device"):
         TrainingJob(QUICK, "synthetic", job.runs, device="cuda").track()
+
+
+def test_a_learner_reports_what_it_prepares(job: TrainingJob, monkeypatch: pytest.MonkeyPatch):
+    make, reported = Toy.trainer, []
+
+    def prepare(self: Toy, track: Track, seeds: Sequence[int]) -> Trainer:
+        track.report(3, 7, "preparing")
+        return make(self, track, seeds)
+
+    monkeypatch.setattr(Toy, "trainer", prepare)
+    job.run([0], lambda done, total, note="": reported.append((done, total, note)))
+    assert reported[0] == (3, 7, "preparing")
+
+
+def test_a_training_without_a_subject_has_other_rows_and_folders_and_the_same_cache(
+    job: TrainingJob, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(
+        strata, "strata", lambda split: pd.DataFrame({"subject": [case.setting.reach for case in split.cases]})
+    )
+    without = replace(job, without="a")
+    assert {case.setting.reach for case in without.track().cases} == {"b"}
+    assert {case.setting.reach for case in job.track().cases} == {"a", "b"}
+    assert without.run_folder(3).path == job.runs / "without/a/toy-0.1/synthetic/seed3"
+    assert without.training_folder([3]).is_relative_to(job.runs / "without/a")
+    assert without.track().cache == job.track().cache

@@ -24,12 +24,12 @@ Curves = Mapping[str, Mapping[str, Mapping[int, pd.DataFrame]]]  # By source of 
 
 def curves(by_source: Curves, rows: pd.DataFrame) -> Iterator[Html]:
     """Learning curves: a picture for each source of reaches."""
-    from dextron_bench.scores import figures
+    from dextron_bench.scores.figures import pictures, training
 
     for reaches, by_method in sorted(by_source.items()):
         methods = {method: dict(seeds) for method, seeds in by_method.items()}
         source_rows = rows[rows["reaches"] == reaches]
-        drawing = figures.inline(lambda file, args=(methods, source_rows): figures.learning_curves(*args, file))
+        drawing = pictures.inline(lambda file, args=(methods, source_rows): training.learning_curves(*args, file))
         title = f"Learning curves on {reaches} reaches"
         label = f"{title}: return on val against epochs for {', '.join(sorted(methods))}"
         picture = _scrollable(svg.picture(drawing, f"curves-{reaches}", label), title)
@@ -67,13 +67,14 @@ def tracks(results: Iterable[dict[str, Any]]) -> Iterator[Html]:
 
 def ridges(folder: Path, shown: Sequence[Shown]) -> Iterator[Html]:
     """Ridge plots of the exemplars of the success model, with links to their recordings."""
-    from dextron_bench.scores import figures
+    from dextron_bench.scores.figures import episodes as drawn_episodes
+    from dextron_bench.scores.figures import pictures
 
     episodes = highlights.ridges(folder, shown)
     if not episodes:
         return
     titled = {f"{kind}\n({episode.player})": episode for kind, episode in episodes.items()}
-    drawing = figures.inline(lambda file: figures.ridges(titled, file))
+    drawing = pictures.inline(lambda file: drawn_episodes.ridges(titled, file))
     label = f"Ridge plots of predicted success over actions and time: {'; '.join(episodes)}"
     exemplars = sorted(
         (recording for recording in shown if recording.kind in KINDS),

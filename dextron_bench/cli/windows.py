@@ -1,0 +1,96 @@
+"""`dextron-bench windows`: draws when closing works on settings of a split, and when agents close there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from dextron_bench.cli.exit_codes import DONE
+from dextron_bench.cli.output import print_table, progress_bar
+from dextron_bench.cli.success_eval import NoRows
+from dextron_bench.reaches.sources import SourceName
+
+if TYPE_CHECKING:
+    from dextron_bench.evaluation.closing_windows import Choice, Window
+    from dextron_bench.methods.agents import Agent
+    from dextron_bench.splits.loading import Split
+
+EXPERT = "expert"
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Draw when closing works on settings of a split, and when agents and each setting's expert close.
+
+    Every setting is played with an opening hand. Near the bottle the episode is forked at each second control step, and
+    the fork closes to its end. Agents play the same settings, without forks.
+
+    Example: dextron-bench windows reflex runs/stopping/real/seed0/weights.safetensors --reaches real
+    """
+
+    agents: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="AGENT")] = ("reflex",)
+    """Methods, labels with shipped weights, module:Class, file.py:Class, or files of weights."""
+    reaches: SourceName = "synthetic"
+    """The source of reaches."""
+    split: str = "val"
+    """The split."""
+    rows: int = 20
+    """How many settings of it, from the first."""
+    into: Annotated[Path, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = Path("figures/windows.png")
+    """The file for the picture."""
+    threads: int = 0
+    """Threads of the simulation; 0 means one per processor."""
+    quiet: bool = False
+    """Show no progress."""
+
+    def __call__(self) -> int:
+        from dextron_bench.evaluation import closing_windows
+        from dextron_bench.experts.policies import ExpertAgent
+        from dextron_bench.reaches.sources import open_source
+        from dextron_bench.scores.figures import episodes, pictures
+        from dextron_bench.splits.loading import load_split
+
+        if self.rows < 1:
+            raise NoRows(f"--rows must be 1 or more, not {self.rows}")
+        pictures.check_format(self.into)
+        split, source = load_split(self.reaches, self.split), open_source(self.reaches)
+        cases = split.cases[: self.rows]
+        agents: dict[str, Agent] = {EXPERT: ExpertAgent(), **dict(map(self._agent, self.agents))}
+        choices = {}
+        with progress_bar("windows", self.quiet) as report:
+            report(0, 1 + len(agents), "forked openings")
+            windows = closing_windows.play_windows(source, cases, self.threads)
+            for number, (name, agent) in enumerate(agents.items(), 1):
+                report(number, 1 + len(agents), name)
+                choices[name] = closing_windows.play_choices(agent, source, cases, self.threads)
+        self.into.parent.mkdir(parents=True, exist_ok=True)
+        title = f"When closing works, and when agents close: {self.split} of {self.reaches} reaches"
+        episodes.windows(windows, choices, title, self.into)
+        _print(split, windows, choices)
+        print(self.into)
+        return DONE
+
+    def _agent(self, name: str) -> tuple[str, Agent]:
+        """The label and the agent of a name."""
+        from dextron_bench.methods import weights
+        from dextron_bench.storage import tensors
+
+        if name.endswith(weights.SUFFIX):
+            file = Path(name)
+            return tensors.read_about(file).get("label", name), weights.load_agent_from_file(file)
+        return weights.agent_by_name(name, self.reaches)
+
+
+def _print(split: Split, windows: list[Window], choices: dict[str, list[Choice]]) -> None:
+    """A row for each setting: the first and the last moment that works, and the choices; a failure has an `x`."""
+    rows = []
+    for row, window in enumerate(windows):
+        working = window.times[window.works]
+        span = f"{working[0]:.2f} to {working[-1]:.2f}" if working.size else "never"
+        cells = [f"{one[row].time:.2f}{'' if one[row].success else ' x'}" for one in choices.values()]
+        rows.append([row, split.cases[row].setting.reach, span, *cells])
+    columns = ["row", "reach", "closing works [s]", *(f"{name} [s]" for name in choices)]
+    print_table(f"{split.name} of {split.reaches} reaches, version {split.digest[:8]}", columns, rows)

@@ -1,0 +1,41 @@
+"""`windows` through the real command line: a picture, a table, and errors in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from dextron_bench.cli import main
+from tests.helpers import tiny_benchmark
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty working folder in the tiny world."""
+    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    tiny_benchmark.forget()
+
+
+def test_the_choices_of_a_rule_and_of_the_expert_are_drawn(here: Path, capsys: pytest.CaptureFixture[str]):
+    words = ["windows", "reflex", "--split", "val", "--threads", "1", "--quiet", "--into", "pictures/windows.svg"]
+    assert main.main(words) == 0
+    printed = capsys.readouterr().out
+    assert all(word in printed for word in ("closing works [s]", "expert [s]", "reflex [s]", "pictures/windows.svg"))
+    (row,) = [line for line in printed.splitlines() if line.startswith("│")]
+    _, number, reach, works, expert, _, _ = (cell.strip() for cell in row.split("│"))
+    assert (number, reach) == ("0", "b")
+    first, last = map(float, works.split(" to "))
+    assert first < last
+    assert "x" not in expert  # The row's expert scores 20.
+    assert (here / "pictures/windows.svg").read_text().startswith("<?xml")
+
+
+def test_an_error_is_one_line(here: Path, complaint: Callable[..., str]):
+    assert "--rows must be 1 or more, not 0" in complaint("windows", "--rows", "0")
+    assert "no picture format '.gif'" in complaint("windows", "--into", "windows.gif")
+    assert "no method 'nix'" in complaint("windows", "nix")
+    assert "No such file" in complaint("windows", "nix.safetensors")
