@@ -12,7 +12,7 @@ from PIL import Image
 from dextron_bench.world.rendering import renderer
 
 WIDTH, HEIGHT = 320, 240  # [pixels]
-CAMERA = replace(renderer.CAMERAS["side"], distance=0.8)
+CAMERA = replace(renderer.CAMERAS["side"], target=(-0.06, -0.06, 0.24))  # [m]; a bottle at 0.5 m is in the picture.
 KEPT = 2000  # Pictures in memory, of 10 kB.
 
 
