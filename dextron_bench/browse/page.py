@@ -19,7 +19,7 @@ POLICY = (
     "frame-ancestors 'none'"
 )
 VALUES = 12  # Columns with more different values show their range.
-EXAMPLES = ("cause == 'too late' and subject == '04' and return < 5", "not success and split in ('test', 'val')")
+EXAMPLE = "cause == 'too late' and subject == '04' and return < 5"
 
 
 def document(episodes: pd.DataFrame, search: Search, token: str, target: str, notice: str = "") -> str:
@@ -61,7 +61,7 @@ def _controls(search: Search) -> Html:
         type="text",
         name="where",
         value=search.where or None,
-        placeholder=EXAMPLES[0],
+        placeholder=EXAMPLE,
         autocomplete="off",
         autocapitalize="off",
         spellcheck="false",
