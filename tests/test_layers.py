@@ -29,7 +29,8 @@ LEVELS = {
     "baselines": 7,
     "leaderboard": 8,
     "sweeps": 8,
-    "cli": 9,
+    "browse": 9,
+    "cli": 10,
 }
 SDKS = {  # Packages of others that one place alone imports.
     "rerun": "dextron_bench/recording/",

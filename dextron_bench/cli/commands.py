@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from dextron_bench.cli import (
+    browse,
     check,
     compare,
     cross_validate,
@@ -65,6 +66,7 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "compare": compare.Compare,
     "plan": plan.Plan,
     "view": view.View,
+    "browse": browse.Browse,
     "recordings": (
         "Recordings: list them, export one as a film or a table, choose a few from the runs.",
         {"list": recordings.List, "export": recordings.Export, "choose": recordings_choose.Choose},

@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from rerun.chunk import Chunk
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.recording import scene, success_plots
+from dextron_bench.recording import phase_lane, scene, success_plots
 from dextron_bench.world import task
 
 EYE, TARGET = (
@@ -107,12 +107,15 @@ def _cell(value: object) -> str:
 def blueprint(with_predictions: bool = False, live: bool = False) -> rrb.Blueprint:
     """Layout with the 3D view on the left, and text and plots on the right.
 
-    With predictions it also has the success curve and the ridge plot. With `live` the viewer follows the newest step.
+    With predictions it also has the success curve and the ridge plot. With `live` the viewer follows the newest step,
+    without the lane of phases: where a movement of the hand begins is known only afterwards.
     """
     text = rrb.TextDocumentView(origin="/card", name="Episode")
     titles = PLOTS_WITH_PREDICTIONS if with_predictions else PLOTS
     plots = [_plot(title, entities, span) for title, (entities, span) in titles.items()]
-    column = rrb.Vertical(text, *plots, row_shares=[5, 4, 5, 3])
+    lane = {} if live else {phase_lane.view(): 3}
+    shares = {text: 10, **lane, **dict(zip(plots, (8, 10, 6), strict=True))}
+    column = rrb.Vertical(*shares, row_shares=list(shares.values()))
     if with_predictions:
         first_column = rrb.Vertical(spatial_view(), _bars(), row_shares=[5, 2])
         content = rrb.Horizontal(first_column, column, _ridge(), column_shares=[9, 7, 4])

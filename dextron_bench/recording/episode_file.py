@@ -18,10 +18,11 @@ import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.phases import phases
 from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.reaches import reach
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.recording import blueprint, rrd_file, scene, success_plots
+from dextron_bench.recording import blueprint, phase_lane, rrd_file, scene, success_plots
 from dextron_bench.recording.digest import digest, lines
 from dextron_bench.recording.rrd_file import APPLICATION
 from dextron_bench.world import model
@@ -101,7 +102,7 @@ def read(file: Path, sha256: str | None = None) -> Recording:
 @cache
 def _static_chunks() -> tuple[list[Chunk], list[str]]:
     """Chunks that are equal in every recording, and their lines for the digest."""
-    chunks = [*scene.static_chunks(), *blueprint.line_styles()]
+    chunks = [*scene.static_chunks(), *blueprint.line_styles(), phase_lane.style()]
     return chunks, list(lines(chunks))
 
 
@@ -122,6 +123,7 @@ def _chunks(episode: Episode, properties: Mapping[str, Value]) -> Iterable[Chunk
         yield Chunk.from_property("run", rr.AnyValues(**_values(properties)))
     yield blueprint.text_document(episode, properties)
     yield from blueprint.signals(episode.states)
+    yield phase_lane.chunk(phases(episode.states, episode.actions))
 
 
 def _values(properties: Mapping[str, Value]) -> dict[str, pa.Array]:

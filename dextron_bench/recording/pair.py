@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 
-from dextron_bench.recording import blueprint, rrd_file, scene
+from dextron_bench.recording import blueprint, phase_lane, rrd_file, scene
 from dextron_bench.recording.episode_file import Recording
 from dextron_bench.recording.summaries import PAIR, read_safely
 
@@ -71,7 +71,7 @@ def _line_styles(side: str) -> Iterable[Chunk]:
 
 
 def _blueprint(names: list[str]) -> rrb.Blueprint:
-    """A column with the scene of each side, and a column with plots of both."""
+    """A column with the scene of each side, and a column with the phases and plots of both."""
     columns = [
         rrb.Vertical(
             blueprint.spatial_view(side, name),
@@ -88,4 +88,5 @@ def _blueprint(names: list[str]) -> rrb.Blueprint:
         )
         for title, (entities, span) in PLOTS.items()
     ]
-    return blueprint.with_time_panel(rrb.Horizontal(*columns, rrb.Vertical(*plots), column_shares=[4, 4, 5]))
+    lanes_and_plots = rrb.Vertical(phase_lane.view(SIDES), *plots, row_shares=[2, 3, 3, 3, 3])
+    return blueprint.with_time_panel(rrb.Horizontal(*columns, lanes_and_plots, column_shares=[4, 4, 5]))

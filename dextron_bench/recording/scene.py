@@ -21,7 +21,11 @@ CONTACT_COLOUR = (230, 60, 200)
 
 def timelines(first: int, last: int) -> list[rr.TimeColumn]:
     """Index columns of control steps `first` to `last`: their numbers, and their times in seconds."""
-    steps = np.arange(first, last + 1)
+    return timelines_at(np.arange(first, last + 1))
+
+
+def timelines_at(steps: np.ndarray) -> list[rr.TimeColumn]:
+    """Index columns of control steps (N,): their numbers, and their times in seconds."""
     nanoseconds = np.round(steps * model.CONTROL_STEP * 1e9).astype("timedelta64[ns]")
     return [rr.TimeColumn("step", sequence=steps), rr.TimeColumn("seconds", duration=nanoseconds)]
 

@@ -83,7 +83,7 @@ def episodes(places: Sequence[Path]) -> pd.DataFrame:
     Raises NoEpisodes, DamagedFile.
     """
     tables = [
-        run_files.stored_episodes(run, ()).assign(folder=str(run.path), **run_identity(run)) for run in _runs(places)
+        run_files.stored_episodes(run, ()).assign(folder=str(run.path), **run_identity(run)) for run in runs_at(places)
     ]
     return pd.concat(tables, ignore_index=True)
 
@@ -131,8 +131,8 @@ def matching(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.DataFrame
     return table[~table["success"]] if episode_filter.failed else table
 
 
-def _runs(places: Sequence[Path]) -> list[RunFolder]:
-    """The folders of runs at or below places, each once."""
+def runs_at(places: Sequence[Path]) -> list[RunFolder]:
+    """The folders of runs at or below places, each once; raises NoEpisodes."""
     runs: dict[RunFolder, None] = {}
     for place in places:
         if place.is_file():

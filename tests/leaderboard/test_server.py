@@ -18,6 +18,7 @@ from urllib.parse import unquote
 import pytest
 
 from dextron_bench.leaderboard import server as leaderboard_server
+from dextron_bench.leaderboard.local_server import LOOPBACK
 
 PAGE = '<a href="../recordings/a%2Bb-success.rrd">success</a>'
 
@@ -47,7 +48,7 @@ def ask(server: leaderboard_server.Server) -> Callable[..., tuple[HTTPResponse, 
     """Sends a request with an unchanged path and returns the response and its body."""
 
     def ask(path: str, method: str = "GET", host: str | None = None) -> tuple[HTTPResponse, bytes]:
-        connection = HTTPConnection(leaderboard_server.LOOPBACK, server.server_port, timeout=5)
+        connection = HTTPConnection(LOOPBACK, server.server_port, timeout=5)
         connection.putrequest(method, path, skip_host=True)
         if host != "":
             connection.putheader("Host", host or f"127.0.0.1:{server.server_port}")
@@ -143,7 +144,7 @@ def test_the_server_serves_the_viewer_until_it_is_interrupted():
     with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout
         port = int(process.stdout.readline().strip().rpartition(":")[2].strip("/"))
-        connection = HTTPConnection(leaderboard_server.LOOPBACK, port, timeout=10)
+        connection = HTTPConnection(LOOPBACK, port, timeout=10)
         connection.request("GET", "/viewer/re_viewer_bg.wasm")
         answer = connection.getresponse()
         assert (answer.status, answer.headers["Content-Type"]) == (200, "application/wasm")
@@ -172,7 +173,7 @@ def test_a_client_that_hangs_up_is_no_traceback(
         met.set()
 
     monkeypatch.setattr(server, "handle_error", handle_error)
-    client = socket.create_connection((leaderboard_server.LOOPBACK, server.server_port))
+    client = socket.create_connection((LOOPBACK, server.server_port))
     client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # Resets when it is closed.
     client.sendall(f"GET /recordings/large.rrd HTTP/1.1\r\nHost: 127.0.0.1:{server.server_port}\r\n\r\n".encode())
     client.recv(1)

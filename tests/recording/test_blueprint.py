@@ -52,7 +52,7 @@ def test_it_opens_with_its_own_layout(whole: Path) -> None:
     [layout] = RrdReader(whole).blueprints()
     assert activated == [layout.recording_id]
     views = [str(chunk.entity_path) for chunk in RrdReader(whole).stream(store=layout).to_chunks()]
-    assert sum(path.startswith("/view/") and path.count("/") == 2 for path in views) == 1 + 1 + len(blueprint.PLOTS)
+    assert sum(path.startswith("/view/") and path.count("/") == 2 for path in views) == 1 + 1 + 1 + len(blueprint.PLOTS)
 
 
 @pytest.mark.parametrize(

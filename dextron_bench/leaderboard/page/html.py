@@ -6,7 +6,7 @@ from html import escape
 
 from dextron_bench.storage.printable import printable
 
-VOID = {"line", "rect"}  # Elements of SVG that are written without an end tag.
+VOID = {"line", "rect", "img", "input"}  # Elements that are written without an end tag.
 
 
 class Html(str):
