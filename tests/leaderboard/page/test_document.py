@@ -72,7 +72,7 @@ def cells(page: Any) -> list[dict[str, Any]]:
 
 
 def values(page: Any, column: str) -> list[float | None]:
-    """The numbers by which the visible rows sort in a column; None if a row has none."""
+    """The numbers of a column, with which the visible rows are sorted; None if a row has none."""
     return page.eval_on_selector_all(
         "#standings tbody tr",
         """(rows, column) => rows.filter(row => row.checkVisibility()).map(row => {
