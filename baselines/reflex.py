@@ -19,7 +19,6 @@ class Reflex:
     """Opens at full speed until the hand comes within a distance, the same for every reach, then closes to the end."""
 
     name: ClassVar[str] = "reflex"
-    rows_are_independent: ClassVar[bool] = True
 
     near: float = 0.065
     """Distance from the palm's centre to the bottle [m]; the default is the best of 0.05, 0.055, ... on `val`."""
@@ -35,6 +34,8 @@ class Reflex:
 
 class ReflexAgent:
     """Opens until the palm's centre comes within `near` [m] of the bottle's axis, then closes, and never reopens."""
+
+    rows_are_independent = True
 
     def __init__(self, near: float) -> None:
         self._near, self._closes = near, np.zeros(0, bool)

@@ -32,8 +32,6 @@ def open_scores(name: str, split: Split, runs: Path, seeds: Sequence[int] = (), 
     if stored is not None:
         return StoredScores(name, stored, split)
     resolved = [plans.beside_other_code(run, runs / FOLDER) for run in _agents(name, split, seeds)]
-    if resolved[0].source != split.reaches:
-        raise OtherSource(f"{name} is always evaluated on {resolved[0].source} reaches, not on {split.reaches}")
     return PlayedScores(resolved, split, runs, threads)
 
 
@@ -63,7 +61,7 @@ def _agents(name: str, split: Split, seeds: Sequence[int]) -> list[Run]:
     files = [] if is_method else _shipped_files(name, split.reaches, seeds)
     if files:
         return [_run_of_weights(file, split) for file in files]
-    run = plans.resolve(Plan(name, split.reaches, (split.name,)))
+    run = _checked(plans.resolve(Plan(name, split.reaches, (split.name,))), split)
     if run.learner is not None:
         return plans.with_shipped_weights(run, seeds)
     return [run.with_seed(seed) for seed in seeds or (0,)]
@@ -78,6 +76,12 @@ def _shipped_files(label: str, reaches: str, seeds: Sequence[int]) -> list[Path]
 def _run_of_weights(file: Path, split: Split) -> Run:
     """The run that acts with the weights of a file, which names its own method."""
     method, settings = weights.maker_of(file)
-    return plans.resolve(Plan(method, split.reaches, (split.name,), settings=settings)).with_weights(
-        weights.seed_of(file), file
-    )
+    run = _checked(plans.resolve(Plan(method, split.reaches, (split.name,), settings=settings)), split)
+    return run.with_weights(weights.seed_of(file), file)
+
+
+def _checked(run: Run, split: Split) -> Run:
+    """The run itself; raises OtherSource if it is not evaluated on the split's reaches."""
+    if run.source != split.reaches:
+        raise OtherSource(f"{run.label} is always evaluated on {run.source} reaches, not on {split.reaches}")
+    return run

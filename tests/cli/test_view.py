@@ -90,10 +90,9 @@ def test_damaged_recordings_are_listed_and_the_others_are_opened(
     capsys.readouterr()
     assert main.main(["view", "runs"]) == 1
     assert opened == others
-    assert capsys.readouterr().err == (
-        f"dextron-bench: {first}: does not have the SHA-256 that was stored for it; "
-        "it was damaged or changed after writing\n"
-    )
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"dextron-bench: {first}: ")
+    assert "damaged" in line  # By the SHA-256 of the file, or by a check that finds the changed bit first.
 
 
 def test_a_line_explains_how_to_select_all_matching_episodes(

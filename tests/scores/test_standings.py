@@ -93,12 +93,12 @@ def test_a_new_method_changes_no_other_interval():
 
 
 def test_the_interquartile_mean_of_a_shipped_split_is_taken_over_its_regions():
-    """The four regions nearest to -x score 20, nine score 0; three are dropped at each end."""
+    """Of sixteen regions the eight nearest to -x score 20, and the others 0; four are dropped at each end."""
     split = load_split("real", "test")
-    near = strata.strata(split)["angle"] == 0
+    near = strata.strata(split)["angle"] <= 1
     results = result("a", 0, np.where(near, 20.0, 0.0).tolist(), split.digest)
     row = standings.table([results]).iloc[0]
-    assert row["iqm"] == 20.0 / 7  # One of the middle seven of 13 regions scores 20.
+    assert row["iqm"] == 10.0  # Four of the middle eight regions score 20.
     assert np.isnan(standings.table([result("a", 0, [20.0])]).iloc[0]["iqm"])
 
 
