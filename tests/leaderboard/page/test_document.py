@@ -145,7 +145,7 @@ def test_the_page_starts_with_test_of_real_and_filters(browser: Any, table: Tabl
         assert shown(opened) == [name for name in best if "sor" in name] != []
         assert opened.locator("#count").inner_text().endswith(f"of {len(table)} rows")
         opened.fill("[name=text]", "")
-        opened.select_option("[name=split]", "train")
+        opened.select_option("[name=split]", "val")
         assert shown(opened) == ["exp"]
         assert opened.locator("section:has(#how-episodes-end) .nothing").is_visible()
         opened.reload()  # The address keeps the choice.
