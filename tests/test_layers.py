@@ -29,7 +29,8 @@ LEVELS = {
     "baselines": 7,
     "leaderboard": 8,
     "sweeps": 8,
-    "cli": 9,
+    "cluster": 9,
+    "cli": 10,
 }
 SDKS = {  # Packages of others that one place alone imports.
     "rerun": "dextron_bench/recording/",
@@ -42,6 +43,7 @@ SDKS = {  # Packages of others that one place alone imports.
     "wandb": "dextron_bench/tracking/to_wandb.py",
     "tyro": "dextron_bench/cli/",
     "rich": "dextron_bench/cli/",
+    "ray": "dextron_bench/cluster/ray_cluster.py",
     "optuna": "dextron_bench/sweeps/optuna_search.py",
 }
 TOP = ("dextron_bench/__init__.py", "dextron_bench/__main__.py")  # Above all levels.
