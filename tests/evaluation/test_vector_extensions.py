@@ -23,7 +23,7 @@ from dextron_bench.storage import hashing
 
 source, cases = open_source("synthetic"), load_split("synthetic", "test").cases[:{ROWS}]
 played = {{}}
-for name in ("expert", "bc", "rlil-0.3"):
+for name in ("expert", "bc", "rlil"):
     agent = ExpertAgent() if name == "expert" else agent_by_name(name, "synthetic")[1]
     episodes = dict(rollout(agent, source, cases, threads=1))
     played[name] = [(fingerprint(episodes[row]), len(episodes[row].actions)) for row in range(len(cases))]
