@@ -6,7 +6,7 @@ The file is longer than 200 lines because one class holds the whole state of a t
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -111,15 +111,15 @@ class Cycle:
         self.epoch += 1
         return self._metrics(losses, scores)
 
-    def _draw(self) -> tuple[np.ndarray, ...]:
-        """The random numbers of this epoch's updates, (FRAMES, S, ...)."""
-        return self._uniform(BATCHES, BATCH), self._normal(NOISE, BATCH)
+    def _draw(self) -> tuple[Any, ...]:
+        """The random numbers of this epoch's updates, arrays or tensors (FRAMES, S, ...)."""
+        return self._uniform(BATCHES, BATCH), self._tensor(self._normal(NOISE, BATCH)[..., None])
 
-    def _update(self, drawn: Sequence[np.ndarray]) -> Tensor:
+    def _update(self, drawn: Sequence[Any]) -> Tensor:
         """The update of a frame, with its random numbers (S, ...); returns the losses (n, S)."""
         uniform, noise = drawn
         assert isinstance(self._sac, Sac)
-        return self._sac.update(self._batch(uniform), self._tensor(noise[..., None]))
+        return self._sac.update(self._batch(uniform), noise)
 
     @property
     def _first_update(self) -> int:

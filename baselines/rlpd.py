@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -96,20 +96,21 @@ class SymmetricCycle(Cycle):
     def _scaled_rewards(self, rewards: np.ndarray) -> np.ndarray:
         return rewards  # The learned temperature fits any scale.
 
-    def _draw(self) -> tuple[np.ndarray, ...]:
+    def _draw(self) -> tuple[Any, ...]:
         """Numbers that select transitions (FRAMES, S, G B), noises (FRAMES, S, (G + 1) B), and orders of the Q."""
         updates, batch, critics = self._method.updates, self._method.batch, self._method.critics
-        selecting, noise = self._uniform(BATCHES, updates * batch), self._normal(NOISE, (updates + 1) * batch)
+        selecting = self._uniform(BATCHES, updates * batch)
+        noise = self._tensor(self._normal(NOISE, (updates + 1) * batch)[..., None])
         orders = (
             self._uniform(PAIRS, updates * critics).reshape(*selecting.shape[:2], updates, critics).argsort(axis=-1)
         )
         return selecting, noise, orders
 
-    def _update(self, drawn: Sequence[np.ndarray]) -> Tensor:
+    def _update(self, drawn: Sequence[Any]) -> Tensor:
         """The updates of a frame, with its random numbers; returns the losses (3, S)."""
         uniform, noise, orders = drawn
         assert isinstance(self._sac, Ensemble)
-        *noises, last = (self._tensor(part[..., None]) for part in np.split(noise, self._method.updates + 1, axis=1))
+        *noises, last = noise.split(self._method.batch, dim=1)
         batches = [self._batch(part) for part in np.split(uniform, self._method.updates, axis=1)]
         parts = zip(batches, noises, orders[..., :2].swapaxes(0, 1), strict=True)
         losses = [self._sac.update_values(*part) for part in parts]
