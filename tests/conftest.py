@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
-from tests.helpers import forged_bundles
+from tests.helpers import forged_bundles, tiny_benchmark
 from tests.helpers.browser import open_browser
 from tests.helpers.small_release import SmallRelease, make_small_release
 
@@ -81,15 +82,45 @@ def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
     return run
 
 
+@pytest.fixture
+def tiny_world(tmp_path: Path) -> Iterator[Path]:
+    """An empty working folder in the tiny world, whose splits lie in data/."""
+    with tiny_benchmark.working_folder(tmp_path):
+        yield tmp_path
+
+
+@pytest.fixture(scope="session")
+def played_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with runs/ of the tiny world: `exp` solves both rows of `test`, recorded; `nothing` solves none."""
+    with tiny_benchmark.working_folder(tmp_path_factory.mktemp("played")) as folder:
+        for words in (["exp", "--record", "2"], ["nothing", "--record", "0"]):
+            assert main.main(["run", "--method", *words, "--split", "test", "--no-floors", "--quiet", "--json"]) == 0
+    return folder
+
+
+@pytest.fixture
+def two_runs(tiny_world: Path, played_runs: Path) -> Path:
+    """A working folder in the tiny world with a copy of these runs."""
+    shutil.copytree(played_runs / "runs", tiny_world / "runs")
+    return tiny_world
+
+
+@pytest.fixture(scope="session")
+def played(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with sound bundles, the agent near.py and the runs that they were made from. Tests leave it as it is."""
+    return forged_bundles.play(tmp_path_factory.mktemp("submission"))
+
+
 @pytest.fixture(scope="module")
-def submitted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A folder with a sound bundle, near.zip, the agent near.py and the runs that it was made from."""
-    yield from forged_bundles.submitted(tmp_path_factory.mktemp("submission"))
+def submitted(played: Path) -> Iterator[Path]:
+    """The folder with the bundles near.zip, of one seed, and twins.zip, of two; their benchmark is installed."""
+    with forged_bundles.installed(played):
+        yield played
 
 
 @pytest.fixture
 def forged(submitted: Path, tmp_path: Path) -> forged_bundles.Forgery:
-    """The sound bundle, taken apart."""
+    """The sound bundle of one seed, taken apart."""
     return forged_bundles.taken_apart(submitted / "near.zip", tmp_path)
 
 

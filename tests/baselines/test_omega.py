@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from dextron_bench.cli import main
 from dextron_bench.methods import registry
 from dextron_bench.storage import hashing
 from dextron_bench.success.network import GRID, SuccessModel
-from tests.helpers import fixed_success_model, tiny_benchmark
+from tests.helpers import fixed_success_model
 
 
 def curves(*points: dict[float, float], elsewhere: float = 0.1) -> np.ndarray:
@@ -148,23 +148,14 @@ def test_a_method_is_created_for_the_reaches_of_its_run(tmp_path: Path):
         registry.create("omega", {}, "minjerk")
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty working folder; tiny splits of short reaches replace the shipped ones."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    tiny_benchmark.forget()
-
-
-def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
+def test_from_the_command_line(tiny_world: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
     words = ["run", "--method", "omega", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
     assert "no success model ships for minjerk reaches" in complaint(*words, "--reaches", "minjerk")
-    assert not (here / "runs").exists()
-    file = fixed_success_model.write(here / "model.safetensors", 0.4)
+    assert not (tiny_world / "runs").exists()
+    file = fixed_success_model.write(tiny_world / "model.safetensors", 0.4)
     assert main.main([*words, "--model", "model.safetensors", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)[0]["method"] == "omega"
-    config = json.loads((here / "runs/omega/synthetic/seed0/config.json").read_text())
+    config = json.loads((tiny_world / "runs/omega/synthetic/seed0/config.json").read_text())
     assert config["settings"] == registry.settings_of(Omega(model="model.safetensors", sha256=hashing.sha256(file)))
     fixed_success_model.write(file, -0.4)
     assert "holds another run: it differs in settings" in complaint(*words, "--model", "model.safetensors")

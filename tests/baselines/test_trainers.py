@@ -22,16 +22,17 @@ from dextron_bench.methods.learners import Track, Trainer
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
-SCHEDULE = Schedule(epochs=4, warm_start=60, period=1)
+FRAMES = 40  # Of an epoch.
+SCHEDULE = Schedule(epochs=4, warm_start=30, period=1)
 KINDS = ("rl", "held", "rlil", "rlpd", "bc", "dagger", "stopping")
 
 
 @pytest.fixture(autouse=True)
 def short_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Shortens epochs to 80 frames, 2 episodes, or 5 updates of BC, DAGGER or STOPPING."""
-    monkeypatch.setattr(cycle, "FRAMES", 80)
+    """Shortens epochs to 40 frames, 2 episodes, or 5 updates of BC, DAGGER or STOPPING."""
+    monkeypatch.setattr(cycle, "FRAMES", FRAMES)
     monkeypatch.setattr("baselines.bc.STEPS", 5)
-    monkeypatch.setattr("baselines.rlpd.WARM_START", 60)
+    monkeypatch.setattr("baselines.rlpd.WARM_START", 30)
     monkeypatch.setattr("baselines.dagger.EPISODES", 2)
     monkeypatch.setattr(stopping_trainer, "UPDATES", 5)
 
@@ -51,13 +52,19 @@ def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: 
     return Cycle(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which demonstrations and openings are played once for all tests."""
+    return tmp_path_factory.mktemp("cache")
+
+
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_restored_trainer_continues_bit_for_bit(kind: str, tmp_path: Path):
-    first, journals = trainer(kind, tmp_path), []
+def test_a_restored_trainer_continues_bit_for_bit(kind: str, cache: Path):
+    first, journals = trainer(kind, cache), []
     for _ in range(2):
         first.advance()
         journals.append(first.journal())
-    second = trainer(kind, tmp_path)
+    second = trainer(kind, cache)
     second.restore(first.state(), journals)
     assert second.epoch == 2
     for _ in range(2):
@@ -69,19 +76,19 @@ def test_a_restored_trainer_continues_bit_for_bit(kind: str, tmp_path: Path):
 
 
 @pytest.mark.parametrize("kind", ["rl", "held", "rlil"])
-def test_a_short_training_equals_the_first_epochs_of_a_long_one(kind: str, tmp_path: Path):
-    short, long = (trainer(kind, tmp_path, schedule=Schedule(epochs, 60, 1)) for epochs in (2, 7))
+def test_a_short_training_equals_the_first_epochs_of_a_long_one(kind: str, cache: Path):
+    short, long = (trainer(kind, cache, schedule=Schedule(epochs, 30, 1)) for epochs in (2, 7))
     for _ in range(2):
         assert short.advance() == long.advance()
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_training_does_not_depend_on_the_number_of_threads(kind: str, tmp_path: Path):
+def test_training_does_not_depend_on_the_number_of_threads(kind: str, cache: Path):
     before, metrics = torch.get_num_threads(), []
     try:
         for threads in (1, 3):
             torch.set_num_threads(threads)
-            learner = trainer(kind, tmp_path)
+            learner = trainer(kind, cache)
             metrics.append([learner.advance() for _ in range(2)])
     finally:
         torch.set_num_threads(before)
@@ -89,8 +96,8 @@ def test_training_does_not_depend_on_the_number_of_threads(kind: str, tmp_path: 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_equal_seeds_train_equally_and_other_seeds_do_not(kind: str, tmp_path: Path):
-    first, second = trainer(kind, tmp_path), trainer(kind, tmp_path)
+def test_equal_seeds_train_equally_and_other_seeds_do_not(kind: str, cache: Path):
+    first, second = trainer(kind, cache), trainer(kind, cache)
     metrics = [first.advance() for _ in range(2)]
     assert metrics == [second.advance() for _ in range(2)]
     one, other = first.weights()
@@ -98,13 +105,13 @@ def test_equal_seeds_train_equally_and_other_seeds_do_not(kind: str, tmp_path: P
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_seed_trains_equally_alone_and_with_other_seeds(kind: str, tmp_path: Path):
+def test_a_seed_trains_equally_alone_and_with_other_seeds(kind: str, cache: Path):
     """The order of sums differs, and physics and Adam amplify the difference, so only the losses are compared.
 
     `test_sac.py` compares the weights, without physics.
     """
-    schedule = Schedule(epochs=4, warm_start=150, period=1)
-    together, alone = trainer(kind, tmp_path, (0, 1), schedule), trainer(kind, tmp_path, (1,), schedule)
+    schedule = Schedule(epochs=4, warm_start=75, period=1)
+    together, alone = trainer(kind, cache, (0, 1), schedule), trainer(kind, cache, (1,), schedule)
     _ = together.advance(), alone.advance()
     (other_seed, actual), (expected,) = together.advance(), alone.advance()
     tolerance = 1e-3 if kind in ("dagger", "stopping") else 1e-2
@@ -113,8 +120,8 @@ def test_a_seed_trains_equally_alone_and_with_other_seeds(kind: str, tmp_path: P
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_weights_give_agents_that_act(kind: str, tmp_path: Path):
-    learner = trainer(kind, tmp_path)
+def test_the_weights_give_agents_that_act(kind: str, cache: Path):
+    learner = trainer(kind, cache)
     learner.advance()
     for weights in learner.weights():
         agent = StoppingAgent(weights) if kind == "stopping" else MeanAgent(weights)
@@ -127,8 +134,8 @@ def test_the_weights_give_agents_that_act(kind: str, tmp_path: Path):
 def test_updates_start_after_the_warm_start(tmp_path: Path):
     learner = trainer("rl", tmp_path)
     (first, _), (second, _) = learner.advance(), learner.advance()
-    assert first["frames"] == 80
-    assert second["frames"] == 160
+    assert first["frames"] == FRAMES
+    assert second["frames"] == 2 * FRAMES
     assert "value_loss" in first
     assert "value_loss" in second
     late = Cycle(Track(SOURCE, CASES, tmp_path, threads=1), [0], Schedule(2, 100, 1), 0)
@@ -145,7 +152,7 @@ def test_held_noise_is_renewed_every_hold_steps_and_updates_begin_after_a_batch(
     assert "value_loss" in metrics
     journal = learner.journal()
     actions, ended = journal["actions"][:, 0], journal["ended"][:, 0].astype(bool)
-    blocks = actions[: (np.argmax(ended) or 80) // 7 * 7].reshape(-1, 7)  # Of the first episode.
+    blocks = actions[: (np.argmax(ended) or len(actions)) // 7 * 7].reshape(-1, 7)  # Of the first episode.
     assert len(blocks) >= 3
     assert (blocks == blocks[:, :1]).all()
     assert len(np.unique(blocks[:, 0])) == len(blocks)

@@ -10,23 +10,14 @@ import pandas as pd
 import pytest
 
 from dextron_bench.browse.site import BrowseSite
-from dextron_bench.cli import main
 from dextron_bench.leaderboard.local_server import LocalServer, ViewerFiles
 from dextron_bench.runs import episode_catalogue
-from tests.helpers import tiny_benchmark
 
 
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+@pytest.fixture
+def runs(two_runs: Path) -> Path:
     """Two runs on two rows of `test`: the experts solve both, and `nothing` solves none."""
-    folder = tmp_path_factory.mktemp("browse")
-    with pytest.MonkeyPatch.context() as patch:
-        tiny_benchmark.install(tiny_benchmark.write(folder / "data"), patch.setattr)
-        words = ["--split", "test", "--no-floors", "--quiet", "--json", "--record", "0", "--runs", str(folder / "runs")]
-        assert main.main(["run", "--method", "exp", *words]) == 0
-        assert main.main(["run", "--method", "nothing", *words]) == 0
-        yield folder / "runs"
-    tiny_benchmark.forget()
+    return two_runs / "runs"
 
 
 @pytest.fixture

@@ -136,7 +136,7 @@ def test_nothing_else_is_served(path: str, ask: Ask):
 
 
 def test_an_episode_without_a_recording_has_no_file(ask: Ask, episodes: pd.DataFrame):
-    assert ask(f"/recordings/{key_of(episodes, 'exp', 1)}.rrd")[0].status == 404
+    assert ask(f"/recordings/{key_of(episodes, 'nothing', 1)}.rrd")[0].status == 404
 
 
 def test_other_sites_and_other_names_are_refused(ask: Ask, episodes: pd.DataFrame, server: LocalServer):

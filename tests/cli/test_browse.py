@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,19 +11,13 @@ import pytest
 from dextron_bench import recording
 from dextron_bench.cli import browse, main
 from dextron_bench.leaderboard.local_server import LocalServer
-from tests.helpers import tiny_benchmark
 
 WORDS = ["--split", "test", "--no-floors", "--quiet", "--json", "--record", "0"]
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A working folder in the tiny world with a run of two solved episodes."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    assert main.main(["run", "--method", "exp", *WORDS]) == 0
-    yield tmp_path
-    tiny_benchmark.forget()
+def here(two_runs: Path) -> Path:
+    return two_runs
 
 
 def test_matching_episodes_as_json(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):

@@ -22,12 +22,10 @@ ROWS = 24
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A working folder; `exp` solves all 24 rows of `test`, and a hand that never closes solves none."""
     rows = pd.DataFrame([("test", *tiny_benchmark.SOLVED[0])] * ROWS, columns=tiny_benchmark.COLUMNS)
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data", rows), monkeypatch.setattr)
     monkeypatch.setattr(in_order, "SLOTS", 4)
     monkeypatch.setattr(result_files, "published_results", lambda: tmp_path / "published")
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    tiny_benchmark.forget()
+    with tiny_benchmark.working_folder(tmp_path, rows):
+        yield tmp_path
 
 
 def compared(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) -> dict[str, Any]:

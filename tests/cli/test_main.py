@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -38,15 +38,12 @@ HEAVY = {"mujoco", "torch", "pandas", "scipy", "matplotlib", "rerun", "pyarrow",
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(tiny_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder, with tiny splits of short reaches instead of the shipped splits."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("DEXTRON_DATA", raising=False)
     monkeypatch.delenv("DEXTRON_DEBUG", raising=False)
-    monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
-    yield tmp_path
-    tiny_benchmark.forget()
+    monkeypatch.setenv("DEXTRON_CACHE", str(tiny_world / "cache"))
+    return tiny_world
 
 
 def mine(folder: Path, spoil: str) -> str:

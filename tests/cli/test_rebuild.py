@@ -11,7 +11,7 @@ from dextron_bench.cli.commands import COMMANDS
 from dextron_bench.cli.rebuild_steps import STEPS, Step
 from dextron_bench.world import model
 
-MAKE = "list"  # A quick command; the test's steps make their files by copying.
+MAKE = "rebuild --list"  # A quick command; the test's steps make their files by copying.
 STEPS_HERE = (
     Step("first", (MAKE,), copies=(("a", "dextron_bench/data/a"),)),
     Step("second", (MAKE,), needs=("dextron_bench/data/a",), copies=(("b", "dextron_bench/data/b"),)),

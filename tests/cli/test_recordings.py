@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -12,19 +13,15 @@ from PIL import Image
 from rerun.chunk import RrdReader
 
 from dextron_bench.cli import main
-from tests.helpers import tiny_benchmark
 
 FOLDER = "runs/exp/synthetic/seed0/recordings"
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(two_runs: Path) -> Path:
     """A working folder in the tiny world with a run of two recorded episodes."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    assert main.main(["run", "--split", "test", "--no-floors", "--quiet", "--json", "--record", "2"]) == 0
-    yield tmp_path
-    tiny_benchmark.forget()
+    shutil.rmtree(two_runs / "runs/nothing")
+    return two_runs
 
 
 def test_recordings_are_listed_with_their_properties(here: Path, capsys: pytest.CaptureFixture[str]):

@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from dextron_bench.cli import main
-from tests.helpers import tiny_benchmark
 
 AGENT = """
 from dataclasses import dataclass
@@ -31,12 +30,10 @@ class Mine:
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Path]:
+def here(tiny_world: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     """A folder with runs of EXP, of an agent with two settings, and of an agent that failed, in the tiny world."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.py").write_text(AGENT.format(name="mine", broken=False))
-    (tmp_path / "broken.py").write_text(AGENT.format(name="broken", broken=True))
+    (tiny_world / "mine.py").write_text(AGENT.format(name="mine", broken=False))
+    (tiny_world / "broken.py").write_text(AGENT.format(name="broken", broken=True))
     common = ["--split", "test", "--no-floors", "--quiet", "--record", "0"]
     for words, code in (
         (["exp"], 0),
@@ -46,8 +43,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     ):
         assert main.main(["run", "--method", *words, *common]) == code
     capsys.readouterr()
-    yield tmp_path
-    tiny_benchmark.forget()
+    return tiny_world
 
 
 @pytest.fixture

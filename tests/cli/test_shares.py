@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.runs import evaluation_job, execution
 from dextron_bench.storage import provenance
-from tests.helpers import tiny_benchmark, tiny_training
+from tests.helpers import tiny_training
 from tests.helpers.tiny_runs import constant_agent, forbidden
 from tests.helpers.tiny_training import TOY
 
@@ -22,14 +22,11 @@ PIECES = "exp/synthetic/seed0/pieces"
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(tiny_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder with the tiny benchmark, cut into pieces of one row."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.setattr(evaluation_job, "ROWS", 1)
-    monkeypatch.chdir(tmp_path)
     on_machine("here", monkeypatch)
-    yield tmp_path
-    tiny_benchmark.forget()
+    return tiny_world
 
 
 def on_machine(name: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,21 +14,14 @@ from dextron_bench import recording
 from dextron_bench.cli import main
 from dextron_bench.storage import tables
 from dextron_bench.success import network
-from tests.helpers import fixed_success_model, tiny_benchmark
+from tests.helpers import fixed_success_model
 
 NOTHING = "runs/nothing/synthetic/seed0"
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A working folder in the tiny world with two runs: one of two solved episodes, one of two that failed."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    words = ["--split", "test", "--no-floors", "--quiet", "--json"]
-    assert main.main(["run", "--method", "exp", "--record", "1", *words]) == 0
-    assert main.main(["run", "--method", "nothing", "--record", "0", *words]) == 0
-    yield tmp_path
-    tiny_benchmark.forget()
+def here(two_runs: Path) -> Path:
+    return two_runs
 
 
 @pytest.fixture
@@ -47,8 +40,9 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_without_a_filter_all_existing_recordings_are_opened(here: Path, opened: list[str]):
     assert main.main(["view"]) == 0
     assert main.main(["view", "runs/exp/synthetic/seed0"]) == 0
-    assert main.main(["view", "runs/exp/synthetic/seed0/recordings/test-0000.rrd"]) == 0
-    assert opened == ["runs/exp/synthetic/seed0/recordings/test-0000.rrd"] * 3
+    both = [f"runs/exp/synthetic/seed0/recordings/test-000{row}.rrd" for row in (0, 1)]
+    assert main.main(["view", both[0]]) == 0
+    assert opened == [*both, *both, both[0]]
     assert not (here / NOTHING / "recordings").exists()
 
 

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from dextron_bench.cli import main
-from tests.helpers import tiny_benchmark
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty working folder in the tiny world."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    tiny_benchmark.forget()
-
-
-def test_the_choices_of_a_rule_and_of_the_expert_are_drawn(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_the_choices_of_a_rule_and_of_the_expert_are_drawn(tiny_world: Path, capsys: pytest.CaptureFixture[str]):
     words = ["windows", "reflex", "--split", "val", "--threads", "1", "--quiet", "--into", "pictures/windows.svg"]
     assert main.main(words) == 0
     printed = capsys.readouterr().out
@@ -31,10 +21,10 @@ def test_the_choices_of_a_rule_and_of_the_expert_are_drawn(here: Path, capsys: p
     first, last = map(float, works.split(" to "))
     assert first < last
     assert "x" not in expert  # The row's expert scores 20.
-    assert (here / "pictures/windows.svg").read_text().startswith("<?xml")
+    assert (tiny_world / "pictures/windows.svg").read_text().startswith("<?xml")
 
 
-def test_an_error_is_one_line(here: Path, complaint: Callable[..., str]):
+def test_an_error_is_one_line(tiny_world: Path, complaint: Callable[..., str]):
     assert "--rows must be 1 or more, not 0" in complaint("windows", "--rows", "0")
     assert "no picture format '.gif'" in complaint("windows", "--into", "windows.gif")
     assert "no method 'nix'" in complaint("windows", "nix")

@@ -6,6 +6,7 @@ import json
 import shutil
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -90,17 +91,30 @@ class Forgery:
         return verification.verify(into, bundle.unpack(packed, into), self.board, threads=1, **options)
 
 
-def submitted(here: Path) -> Iterator[Path]:
-    """A folder with a valid bundle of two seeds on a tiny benchmark; the benchmark stays until the generator ends."""
+def play(here: Path) -> Path:
+    """Plays an agent on a tiny benchmark with two seeds; packs near.zip, with the first, and twins.zip with both."""
+    tiny_benchmark.write(here / "splits", ROWS)
+    (here / "near.py").write_text(AGENT)
+    with installed(here):
+        twins = entry_of(here, (0, 1))
+        folder = playing.play_entry(twins, here / "runs", 1, Limits(start=300.0, answer=100.0), threads=1)
+        playing.write_bundle(twins, folder, here / "twins.zip")
+        playing.write_bundle(entry_of(here, (0,)), folder, here / "near.zip")
+    return here
+
+
+def entry_of(here: Path, seeds: tuple[int, ...]) -> submission_entry.Entry:
+    """The entry of the agent in a folder that `play` made."""
+    return submission_entry.Entry("near", f"{here}/near.py:Near", tiny_benchmark.NAME, seeds)
+
+
+@contextmanager
+def installed(here: Path) -> Iterator[None]:
+    """Replaces the shipped benchmark by the tiny one in a folder that `play` made."""
     try:
         with pytest.MonkeyPatch.context() as patch:
-            tiny_benchmark.write(here / "splits", ROWS)
             tiny_benchmark.install(here / "splits", patch.setattr)
-            (here / "near.py").write_text(AGENT)
-            entry = submission_entry.Entry("near", f"{here}/near.py:Near", tiny_benchmark.NAME, (0, 1))
-            folder = playing.play_entry(entry, here / "runs", 1, Limits(start=300.0, answer=100.0), threads=1)
-            playing.write_bundle(entry, folder, here / "near.zip")
-            yield here
+            yield
     finally:
         tiny_benchmark.forget()
 
@@ -108,9 +122,8 @@ def submitted(here: Path) -> Iterator[Path]:
 def taken_apart(file: Path, here: Path) -> Forgery:
     """Unpacks a bundle, so that a test can change it."""
     folder = here / "forged"
-    bundle.unpack(file, folder)
     with zipfile.ZipFile(file) as archive:
-        (folder / bundle.MANIFEST).write_bytes(archive.read(bundle.MANIFEST))
+        archive.extractall(folder)
     return Forgery(folder, here / "board")
 
 

@@ -6,10 +6,12 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
+import pytest
 
 from dextron_bench.reaches import sources
 from dextron_bench.splits import loading
@@ -55,6 +57,18 @@ def install(folder: Path, put: Callable[[object, str, object], None] = setattr) 
     put(loading, "files", lambda package: folder)
     put(sources, "SOURCES", {**sources.SOURCES, NAME: lambda: SOURCE})
     forget()
+
+
+@contextmanager
+def working_folder(folder: Path, rows: pd.DataFrame = ROWS) -> Iterator[Path]:
+    """Makes a folder the working folder, and replaces the shipped splits by `rows`, which it keeps in data/."""
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            install(write(folder / "data", rows), patch.setattr)
+            patch.chdir(folder)
+            yield folder
+    finally:
+        forget()
 
 
 def forget() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
@@ -33,15 +32,12 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.fixture
-def board(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def board(tiny_world: Path) -> Path:
     """A board with two baselines on a tiny benchmark."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "splits"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
     for method in METHODS:
         assert main.main(["run", "--method", method, "--no-floors", "--quiet"]) == 0
     assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
-    yield tmp_path / "board"
-    tiny_benchmark.forget()
+    return tiny_world / "board"
 
 
 def words(*more: str) -> list[str]:

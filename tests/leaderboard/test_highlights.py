@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,21 +11,15 @@ from dextron_bench.cli import main
 from dextron_bench.leaderboard import highlights
 from dextron_bench.runs import selection
 from dextron_bench.success import network
-from tests.helpers import fixed_success_model, tiny_benchmark
+from tests.helpers import fixed_success_model
 
 
 @pytest.fixture
-def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def runs(two_runs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Two runs of two episodes in the tiny world: one solves both, the other neither."""
-    tiny_benchmark.install(tiny_benchmark.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
     model = fixed_success_model.model(0.9, slope=-8.0)  # It predicts success for most actions.
     monkeypatch.setattr(network, "shipped_model", lambda reaches: model)
-    options = ["--split", "test", "--no-floors", "--quiet", "--json", "--record", "0"]
-    for method in ("exp", "nothing"):
-        assert main.main(["run", "--method", method, *options]) == 0
-    yield tmp_path / "runs"
-    tiny_benchmark.forget()
+    return two_runs / "runs"
 
 
 def test_each_method_has_its_shortest_episodes_and_each_kind_its_clearest(runs: Path):

@@ -58,7 +58,7 @@ def test_missing_and_additional_seeds_on_the_board_are_problems(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
     board = tmp_path / "board"
-    assert main.main(["leaderboard", "add", str(submitted / "near.zip"), "--board", str(board)]) == 0
+    assert main.main(["leaderboard", "add", str(submitted / "twins.zip"), "--board", str(board)]) == 0
     folder = board / "results/near/synthetic"
     shutil.copytree(folder / "seed0", folder / "seed2")
     assert main.main(["leaderboard", "verify", "--all", "--board", str(board)]) == 1
@@ -89,7 +89,7 @@ def test_view_records_any_episode_of_a_bundle(
 ):
     """The bundle has recordings of row 0 only; row 2 of `test` failed."""
     monkeypatch.chdir(tmp_path)
-    bundle = str(submitted / "near.zip")
+    bundle = str(submitted / "twins.zip")
     assert main.main(["view", bundle, "--print"]) == 0
     assert {Path(line).name for line in capsys.readouterr().out.split()} == {"test-0000.rrd", "unseen-reach-0000.rrd"}
     assert main.main(["view", bundle, "--print", "--failed", "--seed", "1", "--quiet"]) == 0

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench.cli import main
 from dextron_bench.runs import episode_catalogue, selection
 from dextron_bench.storage import tables
-from tests.helpers import tiny_benchmark
 
 
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    folder = tmp_path_factory.mktemp("catalogue")
-    with pytest.MonkeyPatch.context() as patch:
-        tiny_benchmark.install(tiny_benchmark.write(folder / "data"), patch.setattr)
-        words = ["--split", "test", "--no-floors", "--quiet", "--json", "--record", "0", "--runs", str(folder / "runs")]
-        assert main.main(["run", "--method", "exp", *words]) == 0
-        yield folder / "runs"
-    tiny_benchmark.forget()
+@pytest.fixture
+def runs(two_runs: Path) -> Path:
+    """A run of two solved episodes."""
+    shutil.rmtree(two_runs / "runs/nothing")
+    return two_runs / "runs"
 
 
 def test_rows_have_the_words_of_the_command_line(runs: Path):
@@ -57,12 +51,9 @@ def test_what_is_no_state_is_not_drawn(state: object):
     assert episode_catalogue.last_state(pd.Series({episode_catalogue.STATE: state})) is None
 
 
-def test_a_table_of_an_earlier_version_has_no_states(runs: Path, tmp_path: Path):
-    folder = tmp_path / "runs/exp/synthetic/seed0"
-    folder.mkdir(parents=True)
-    source = runs / "exp/synthetic/seed0"
-    (folder / "result.json").write_bytes((source / "result.json").read_bytes())
-    stored = pd.read_parquet(source / "episodes.parquet").drop(columns=episode_catalogue.STATE)
+def test_a_table_of_an_earlier_version_has_no_states(runs: Path):
+    file = runs / "exp/synthetic/seed0/episodes.parquet"
+    stored = pd.read_parquet(file).drop(columns=episode_catalogue.STATE)
     stored.attrs = {}
-    tables.write(folder / "episodes.parquet", stored)
-    assert episode_catalogue.last_state(episode_catalogue.read([tmp_path]).iloc[0]) is None
+    tables.write(file, stored)
+    assert episode_catalogue.last_state(episode_catalogue.read([runs]).iloc[0]) is None

@@ -40,6 +40,14 @@ def test_a_result_is_complete_and_uses_the_splits_that_ship(file: Path):
         assert published["failed"] == 0
 
 
+@pytest.mark.parametrize("file", (BOARD / "results/exp").glob("*/seed0/result.json"), ids=name)
+def test_experts_solve_every_row_of_the_splits_that_can_be_solved(file: Path):
+    splits = result_files.read_result(file)["splits"]
+    assert "hard" in splits
+    for split_name, split in splits.items():
+        assert split_name == "open" or set(split["scores"]) == {20.0}
+
+
 def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
     rebuilt = tmp_path / "board"
     shutil.copytree(BOARD, rebuilt)

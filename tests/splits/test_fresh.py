@@ -92,7 +92,8 @@ def test_splits_that_no_search_draws_are_refused(name: str):
 
 
 @pytest.mark.slow
-def test_experts_solve_fresh_settings_of_a_shipped_split():
+def test_experts_solve_fresh_settings_of_a_shipped_split(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(fresh, "BLOCK", 16)
     source = open_source("synthetic")
-    drawn = fresh.draw("synthetic", "test", 0, Engine(1024, 2), rows=5)
-    assert [episode.score for _, episode in rollout(ExpertAgent(), source, drawn.cases)] == [20.0] * 5
+    drawn = fresh.draw("synthetic", "test", 0, Engine(128, 2), rows=3)
+    assert [episode.score for _, episode in rollout(ExpertAgent(), source, drawn.cases)] == [20.0] * 3

@@ -81,7 +81,7 @@ def test_a_part_that_goes_on_to_the_right_fades_there_until_it_is_scrolled_to_it
         standings = opened.locator(".scroll.wide")
         assert standings.evaluate("part => getComputedStyle(part).maskImage") != "none"
         standings.evaluate("part => part.scrollTo(part.scrollWidth, 0)")
-        opened.wait_for_function("!document.querySelector('.scroll.wide').classList.contains('more')")
+        opened.wait_for_selector(".scroll.wide:not(.more)")
         assert standings.evaluate("part => getComputedStyle(part).maskImage") == "none"
 
 

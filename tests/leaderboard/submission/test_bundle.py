@@ -17,6 +17,7 @@ import pytest
 from dextron_bench.leaderboard.submission import bundle, entry
 from dextron_bench.leaderboard.submission.declaration import Declaration
 from tests.helpers import tiny_benchmark
+from tests.helpers.forged_bundles import entry_of
 
 
 class Unsafe:
@@ -96,9 +97,9 @@ def test_a_zip_bomb_of_many_files_is_refused(unsafe: Unsafe, tmp_path: Path, mon
 
 def test_a_changed_byte_is_refused(submitted: Path, unsafe: Unsafe, tmp_path: Path):
     for place, (info, content) in enumerate(unsafe.members):
-        if info.filename == "seed1/result.json":
+        if info.filename == "seed0/result.json":
             unsafe.members[place] = (info, content.replace(b"20.0", b"19.0", 1))
-    assert "seed1/result.json has another SHA-256 than the manifest lists" in unsafe.refused(tmp_path / "into")
+    assert "seed0/result.json has another SHA-256 than the manifest lists" in unsafe.refused(tmp_path / "into")
     cut = tmp_path / "cut.zip"
     cut.write_bytes((submitted / "near.zip").read_bytes()[:-30])
     with pytest.raises(bundle.BadBundle, match="not a complete zip file"):
@@ -110,7 +111,7 @@ def test_only_files_of_the_entered_seeds_are_packed(submitted: Path, tmp_path: P
     folder = submitted / "runs" / entry.FOLDER / "near" / tiny_benchmark.NAME
     shutil.copytree(folder, tmp_path / "near")
     (tmp_path / "near/seed0/.episodes.parquet.77.part").touch()
-    manifest = entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0,)).manifest()
+    manifest = entry_of(submitted, (0,)).manifest()
     names = bundle.pack(tmp_path / "near", manifest, {}, tmp_path / "near.zip")["files"]
     assert {name.split("/")[0] for name in names} == {"seed0"}
     assert not [name for name in names if "part" in name]

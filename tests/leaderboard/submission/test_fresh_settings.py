@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -31,45 +32,54 @@ needs_sandbox = pytest.mark.skipif(not sandbox.is_available(), reason="bubblewra
 FRESH = FreshSettings("0" * 64, "a beacon", rows=16)
 
 
+def draw(reaches: str, name: str, seed: int, *_: object) -> Split:
+    """Instead of a search: two settings that an expert solves, with noise that follows from the seed."""
+    rows = pd.DataFrame([("-", *one) for one in tiny_benchmark.SOLVED], columns=tiny_benchmark.COLUMNS)
+    table = rows.assign(window=0.0, duration_noise=rows["duration_noise"] + seed % 7 / 1000)
+    return Split(name, reaches, tuple(cases_from_frame(table)), split_digest(table))
+
+
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Instead of a search: each fresh split has two settings that an expert solves."""
-    rows = pd.DataFrame([("-", *one) for one in tiny_benchmark.SOLVED], columns=tiny_benchmark.COLUMNS)
-
-    def draw(reaches: str, name: str, seed: int, *_: object) -> Split:
-        table = rows.assign(window=0.0, duration_noise=rows["duration_noise"] + seed % 7 / 1000)
-        return Split(name, reaches, tuple(cases_from_frame(table)), split_digest(table))
-
     monkeypatch.setattr(fresh, "draw", draw)
 
 
-@pytest.fixture
-def added(forged: Forgery, drawn: None) -> Forgery:
+@pytest.fixture(scope="module")
+def merged(submitted: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A board with a submission that played fresh settings."""
     if not sandbox.is_available():
         pytest.skip("bubblewrap is not installed")
-    add.merge(forged.checked(rerun=True, fresh=FRESH), forged.board)
-    return forged
+    forged = forged_bundles.taken_apart(submitted / "near.zip", tmp_path_factory.mktemp("merged"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fresh, "draw", draw)
+        add.merge(forged.checked(rerun=True, fresh=FRESH), forged.board)
+    return forged.board
 
 
-def test_the_scores_on_fresh_settings_name_what_they_follow_from(added: Forgery):
-    result = json.loads((added.board / "results/near/synthetic/seed1/result.json").read_text())
+@pytest.fixture
+def board(merged: Path, drawn: None, tmp_path: Path) -> Path:
+    """A copy of that board."""
+    return shutil.copytree(merged, tmp_path / "board")
+
+
+def test_the_scores_on_fresh_settings_name_what_they_follow_from(board: Path):
+    result = json.loads((board / "results/near/synthetic/seed0/result.json").read_text())
     played = result["fresh"]
     assert (played["beacon"], played["submission"]) == ("a beacon", "0" * 64)
     assert set(played["splits"]) == {"test", "unseen-reach"}
     assert len(played["splits"]["test"]["scores"]) == 2
-    table = pd.read_csv(added.board / "table.csv").set_index(["method", "split"])
+    table = pd.read_csv(board / "table.csv").set_index(["method", "split"])
     mean = np.mean(played["splits"]["test"]["scores"])
-    assert table.loc[("near", "test"), "fresh"] == pytest.approx(mean)  # Both seeds act the same.
+    assert table.loc[("near", "test"), "fresh"] == pytest.approx(mean)
 
 
-def test_the_terminal_shows_fresh_scores_and_the_mark(added: Forgery, capsys: pytest.CaptureFixture[str]):
-    words = ["leaderboard", "show", "--runs", str(added.board / "results")]
+def test_the_terminal_shows_fresh_scores_and_the_mark(board: Path, capsys: pytest.CaptureFixture[str]):
+    words = ["leaderboard", "show", "--runs", str(board / "results")]
     assert main.main(words) == 0
     shown = capsys.readouterr().out
     assert "fresh [95 %]" in shown
     assert "not on fresh settings" not in shown
-    for file in added.board.glob("results/near/synthetic/seed*/result.json"):
+    for file in board.glob("results/near/synthetic/seed*/result.json"):
         result = json.loads(file.read_text())
         for scores, score in ((result, 20.0), (result["fresh"], 0.0)):
             scores["splits"]["test"]["scores"] = [score for _ in scores["splits"]["test"]["scores"]]
@@ -82,25 +92,23 @@ def findings(board: Path, redraw: bool) -> list[str]:
     return [p for row in verify_board.rows(board) for p in verify_board.check(row, board, redraw=redraw).problems]
 
 
-def test_fresh_scores_of_the_board_are_verified(added: Forgery):
-    assert findings(added.board, redraw=True) == []
-    file = added.board / "results/near/synthetic/seed0/result.json"
+def test_fresh_scores_of_the_board_are_verified(board: Path):
+    assert findings(board, redraw=True) == []
+    file = board / "results/near/synthetic/seed0/result.json"
     result = json.loads(file.read_text())
     result["fresh"]["splits"]["test"]["scores"][0] = 1.0
     file.write_text(json.dumps(result))
-    assert findings(added.board, redraw=False) == ["its scores on fresh settings differ from its actions, played again"]
+    assert findings(board, redraw=False) == ["its scores on fresh settings differ from its actions, played again"]
 
 
-def test_settings_that_do_not_follow_from_the_beacon_are_a_problem(added: Forgery):
+def test_settings_that_do_not_follow_from_the_beacon_are_a_problem(board: Path):
     """Another beacon is claimed: plain verification replays the actions, and only a new draw shows the difference."""
-    file = added.board / "results/near/synthetic/seed0/result.json"
+    file = board / "results/near/synthetic/seed0/result.json"
     result = json.loads(file.read_text())
     result["fresh"]["beacon"] = "another"
     file.write_text(json.dumps(result))
-    assert findings(added.board, redraw=False) == []
-    assert findings(added.board, redraw=True) == [
-        "its fresh settings of test, unseen-reach do not follow from its beacon"
-    ]
+    assert findings(board, redraw=False) == []
+    assert findings(board, redraw=True) == ["its fresh settings of test, unseen-reach do not follow from its beacon"]
 
 
 def test_a_bundle_cannot_bring_fresh_scores(forged: Forgery):
@@ -171,6 +179,7 @@ def here(tmp_path_factory: pytest.TempPathFactory, thorough: bool) -> Iterator[P
     (folder / "memory.py").write_text(MEMORY.format(starts=starts.tolist(), experts=experts, **numbers))
     (folder / "near.py").write_text(forged_bundles.AGENT)
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fresh, "BLOCK", 32)
         tiny_benchmark.install(tiny_benchmark.write(folder / "splits", known.assign(split="test")), patch.setattr)
         drawn = replace(FRESH, rows=40 if thorough else 16).draw(tiny_benchmark.NAME)
         patch.setattr(FreshSettings, "draw", lambda *_: drawn)  # Once for all agents.

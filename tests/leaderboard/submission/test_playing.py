@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.leaderboard.submission import entry as submission_entry
 from dextron_bench.leaderboard.submission import playing
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.splits.loading import Split, cases_from_frame
-from tests.helpers import tiny_benchmark
+from tests.helpers import forged_bundles, tiny_benchmark
 
 
 def test_equal_submissions_have_equal_bytes_and_nothing_is_played_twice(submitted: Path, tmp_path: Path):
-    entry = submission_entry.Entry("near", f"{submitted}/near.py:Near", tiny_benchmark.NAME, (0, 1))
+    entry = forged_bundles.entry_of(submitted, (0, 1))
 
     def forbidden(*_: object) -> None:
         raise AssertionError("played again")
@@ -24,7 +23,7 @@ def test_equal_submissions_have_equal_bytes_and_nothing_is_played_twice(submitte
         patch.setattr(playing, "play_shuffled", forbidden)
         folder = playing.play_entry(entry, submitted / "runs", 1, Limits(), threads=1)
     playing.write_bundle(entry, folder, tmp_path / "again.zip")
-    assert (tmp_path / "again.zip").read_bytes() == (submitted / "near.zip").read_bytes()
+    assert (tmp_path / "again.zip").read_bytes() == (submitted / "twins.zip").read_bytes()
 
 
 def test_episodes_are_played_in_an_order_that_depends_on_split_and_seed():

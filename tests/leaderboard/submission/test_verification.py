@@ -10,15 +10,15 @@ import pandas as pd
 import pytest
 
 from dextron_bench.methods.isolation import sandbox
-from tests.helpers.forged_bundles import Forgery, row
+from tests.helpers.forged_bundles import Forgery, row, taken_apart
 
 needs_sandbox = pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
 
 
 @needs_sandbox
-def test_a_valid_submission_is_replayed_bit_for_bit_and_its_agent_run_again(forged: Forgery):
+def test_a_valid_submission_is_replayed_bit_for_bit_and_its_agent_run_again(submitted: Path, tmp_path: Path):
     """One of the four episodes of each seed knocks the bottle over."""
-    verdict = forged.checked(rerun=True)
+    verdict = taken_apart(submitted / "twins.zip", tmp_path).checked(rerun=True)
     assert verdict.problems == []
     assert verdict.notes[-1] == "all seeds have the same episodes: they count as one, not as several trainings"
     assert (verdict.tier, verdict.episodes, verdict.exact) == ("re-run", 8, 8)
@@ -118,7 +118,8 @@ def test_another_agents_episodes_are_refused_unless_the_agent_chooses_them(submi
     assert line in rerun.notes
 
 
-def test_chosen_and_hidden_seeds_are_refused(forged: Forgery):
+def test_chosen_and_hidden_seeds_are_refused(submitted: Path, tmp_path: Path):
+    forged = taken_apart(submitted / "twins.zip", tmp_path)
     forged.json("bundle.json", lambda manifest: manifest.update(seeds=[1]))
     problems = forged.checked().problems
     assert "has seeds [1]; they must be 0, 1, 2" in problems[0]
