@@ -3,6 +3,7 @@
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -21,7 +22,6 @@ from dextron_bench.reaches import setting
 from dextron_bench.storage import folder_config, provenance, shares, tables
 from dextron_bench.storage.shares import Share
 from dextron_bench.world.engine import Engine
-from tests.helpers import tiny_benchmark
 from tests.helpers.short_reaches import SOURCE
 
 Blocks = Iterator[tuple[int, pd.DataFrame]]  # Numbers of blocks, and their draws.
@@ -221,29 +221,36 @@ def test_a_block_that_is_cut_edited_or_of_another_search_is_named(tmp_path):
         block.write_bytes(whole)
 
 
+WHOLE = """
+import sys
+from pathlib import Path
+from tests.experts.test_montecarlo import search
+folder = Path(sys.argv[1])
+search(folder, rows=3).to_parquet(folder / "draws.parquet")
+"""
+
+
 @pytest.mark.slow
 def test_a_killed_search_continues_to_the_same_rows(tmp_path):
-    """It is killed before its first block, and then once while it has some of them."""
-    data = tiny_benchmark.write(tmp_path / "data")
+    """It is killed before its first block, and then with one block and with two."""
 
-    def start(folder: str) -> subprocess.Popen[str]:
-        words = ["mc", "--rows", "20", "--threads", "1", "--quiet", "--runs"]
-        return tiny_benchmark.start(data, *words, tmp_path / folder)
+    def start(folder: Path) -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, "-c", WHOLE, str(folder)], cwd=Path(__file__).parents[2])
 
-    def blocks_of(folder: str) -> int:
-        return len(list((tmp_path / folder).rglob("blocks/*.parquet")))
+    def count(folder: Path) -> int:
+        return len(list(folder.glob("blocks/*.parquet")))
 
-    assert start("whole").wait() == 0
-    assert blocks_of("whole") >= 2
-    for count in (0, 1):
-        process = start("killed")
-        while blocks_of("killed") < count and process.poll() is None:
-            time.sleep(0.05)
-        time.sleep(2.0)
-        process.send_signal(signal.SIGKILL)
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    assert start(whole).wait() == 0
+    assert count(whole) >= 4
+    for blocks_before in (0, 1, 2):
+        process = start(killed)
+        while count(killed) < blocks_before or not killed.exists():
+            assert process.poll() is None
+            time.sleep(0.01)
+        time.sleep(0.3)
+        process.kill()
         assert process.wait() == -signal.SIGKILL
-        process.communicate()
-    assert start("killed").wait() == 0
-    name = "mc/synthetic/seed0/experts-synthetic.parquet"
-    whole, killed = ((tmp_path / run / name).read_bytes() for run in ("whole", "killed"))
-    assert whole == killed
+        assert not (killed / "draws.parquet").exists()
+    assert start(killed).wait() == 0
+    assert (killed / "draws.parquet").read_bytes() == (whole / "draws.parquet").read_bytes()

@@ -125,7 +125,7 @@ def test_settings_survive_the_way_through_a_table(drawn: None):
     assert fresh_settings.from_frame(fresh_settings.to_frame(splits), "synthetic") == splits
 
 
-# Agents on a split of eight solved settings of two short reaches, and on sixteen fresh settings. With `--thorough`
+# Agents on a split of eight solved settings of two short reaches, and on eight fresh settings. With `--thorough`
 # twelve and forty, and a third agent, whose gap is beyond noise on as many only.
 
 MEMORY = """
@@ -181,7 +181,7 @@ def here(tmp_path_factory: pytest.TempPathFactory, thorough: bool) -> Iterator[P
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fresh, "BLOCK", 32)
         tiny_benchmark.install(tiny_benchmark.write(folder / "splits", known.assign(split="test")), patch.setattr)
-        drawn = replace(FRESH, rows=40 if thorough else 16).draw(tiny_benchmark.NAME)
+        drawn = replace(FRESH, rows=40 if thorough else 8).draw(tiny_benchmark.NAME)
         patch.setattr(FreshSettings, "draw", lambda *_: drawn)  # Once for all agents.
         yield folder
     tiny_benchmark.forget()
