@@ -5,28 +5,24 @@ The file is longer than 200 lines because one class holds the whole state of a t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from baselines import demonstrations
 from baselines.normalise import CLIP, Moments
 from baselines.policy import STATE
-from baselines.replay import Replay, Transitions
-from baselines.sac import BATCH, Batch, Sac
+from baselines.random_streams import ACTING, EPISODES, HOLDING, NETWORKS, WARM_START, Draws, generator
+from baselines.replay import CAPACITY, Replay, Transitions
+from baselines.sac import BATCH, Batch
 from baselines.schedule import Exploration, Schedule
 from dextron_bench import Case, Track
 from dextron_bench.methods.learners import Arrays
 from dextron_bench.world.engine import Engine
 
-CAPACITY = 1_000_000  # Transitions in either buffer (table II).
 FRAMES = 1000  # Control steps of the agent in an epoch.
-
-# The random streams of each seed.
-NETWORKS, EPISODES, DEMONSTRATIONS, ACTING, WARM_START, BATCHES, NOISE, HOLDING = range(8)
 
 
 class Networks(Protocol):
@@ -50,30 +46,67 @@ class Networks(Protocol):
         ...
 
 
+class Algorithm(Protocol):
+    """How the networks learn from batches of transitions."""
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """Names of what an update returns for each agent."""
+        ...
+
+    @property
+    def scales_rewards(self) -> bool:
+        """True if rewards are divided by their deviation so far."""
+        ...
+
+    @property
+    def networks(self) -> Networks:
+        """The networks that learn."""
+        ...
+
+    def draw(self, draws: Draws) -> tuple[Any, ...]:
+        """The random numbers of an epoch's updates, arrays or tensors (FRAMES, S, ...)."""
+        ...
+
+    def update(self, batch: Callable[[np.ndarray], Batch], drawn: Sequence[Any]) -> Tensor:
+        """Learns at a frame, with its random numbers (S, ...); returns the losses (n, S).
+
+        `batch` gives the scaled transitions that numbers (S, B) in [0, 1) select.
+        """
+        ...
+
+
+class Demonstrations(Protocol):
+    """Transitions of experts."""
+
+    def select(self, uniform: np.ndarray, frames: int) -> Transitions:
+        """The transitions (S, B) that numbers (S, B) in [0, 1) select after so many frames."""
+        ...
+
+
 class Cycle:
-    """The Trainer of RL and RLIL: trains S agents by SAC; each batch has a share of demonstrations.
-
-    RLPD replaces the networks, the choice of demonstrations, the scale of rewards, and what is drawn and learned at a
-    frame: `_make_networks`, `_load_demonstrations`, `_select_demonstrations`, `_scaled_rewards`, `_draw`, `_update`.
-    """
-
-    losses = "action_value_loss", "value_loss", "policy_loss"  # What an update returns for each agent.
+    """The Trainer of RL, RLIL and RLPD: S agents act, keep what they met, and learn from it and from demonstrations."""
 
     def __init__(
         self,
         track: Track,
         seeds: Sequence[int],
         schedule: Schedule,
-        demonstrated: int,
+        algorithm: Callable[[Sequence[np.random.Generator], str], Algorithm],
+        demonstrations: Demonstrations | None = None,
+        demonstrated: int = 0,
         exploration: Exploration = Exploration(),  # noqa: B008 (frozen)
-        critics: int = 1,
     ) -> None:
-        """Trains one agent per seed, with `critics` Q; `demonstrated` of the BATCH transitions come from experts."""
+        """Trains one agent per seed; the first `demonstrated` transitions of each batch come from experts.
+
+        `algorithm` takes a generator for each agent's networks, and the device.
+        """
         self.epoch = 0
         self._track, self._seeds, self._schedule, self._exploration = track, list(seeds), schedule, exploration
-        self._demonstrated, self._frames = demonstrated, 0
+        self._demonstrations, self._demonstrated, self._frames = demonstrations, demonstrated, 0
         agents = len(self._seeds)
-        self._sac = self._make_networks([self._rng(seed, NETWORKS) for seed in seeds], critics)
+        self._algorithm = algorithm([generator(seed, NETWORKS) for seed in seeds], track.device)
+        self._networks = self._algorithm.networks
         self._states, self._rewards = Moments(agents, STATE), Moments(agents, 1)
         self._replay = Replay(agents, CAPACITY + CAPACITY // 16)
         self._ids = np.arange(agents)
@@ -82,24 +115,13 @@ class Cycle:
         self._score = np.zeros(agents)
         self._noise, self._length, self._holds = np.zeros((agents, 1)), np.zeros(agents, int), np.zeros(agents, bool)
         self._recent: list[tuple[Transitions, np.ndarray]] = []
-        if demonstrated:
-            self._load_demonstrations()
         self._now = self._begin(self._ids)
-
-    def _make_networks(self, rngs: Sequence[np.random.Generator], critics: int) -> Networks:
-        """The networks of each agent, drawn from its own generator."""
-        return Sac(rngs, self._track.device, critics)
-
-    def _load_demonstrations(self) -> None:
-        """Loads the demonstrations, and draws the order in which each seed's expert plays them."""
-        self._demos, length = demonstrations.load(self._track, self._schedule.episodes), self._schedule.epochs * FRAMES
-        streams = [self._demos.stream(self._rng(seed, DEMONSTRATIONS), length) for seed in self._seeds]
-        self._stream = np.stack(streams)
 
     def advance(self) -> list[dict[str, float]]:
         """Trains for FRAMES cycles; returns each seed's losses, number of finished episodes and their mean return."""
-        acting, random = self._normal(ACTING, 1), self._uniform(WARM_START, 1) * 2.0 - 1.0
-        draws = self._draw()
+        draws = Draws(self._seeds, self.epoch, FRAMES)
+        acting, random = draws.normal(ACTING, 1), draws.uniform(WARM_START, 1) * 2.0 - 1.0
+        drawn = self._algorithm.draw(draws)
         losses: list[Tensor] = []
         scores: list[list[float]] = [[] for _ in self._seeds]
         for t in range(FRAMES):
@@ -107,19 +129,9 @@ class Cycle:
             noise_now = self._hold(acting[t] if is_warm else random[t], everywhere=not is_warm)
             self._step(self._act(noise_now) if is_warm else noise_now, scores)
             if is_warm or self._frames >= self._first_update:
-                losses.append(self._update([draw[t] for draw in draws]))
+                losses.append(self._algorithm.update(self._batch, [numbers[t] for numbers in drawn]))
         self.epoch += 1
         return self._metrics(losses, scores)
-
-    def _draw(self) -> tuple[Any, ...]:
-        """The random numbers of this epoch's updates, arrays or tensors (FRAMES, S, ...)."""
-        return self._uniform(BATCHES, BATCH), self._tensor(self._normal(NOISE, BATCH)[..., None])
-
-    def _update(self, drawn: Sequence[Any]) -> Tensor:
-        """The update of a frame, with its random numbers (S, ...); returns the losses (n, S)."""
-        uniform, noise = drawn
-        assert isinstance(self._sac, Sac)
-        return self._sac.update(self._batch(uniform), noise)
 
     @property
     def _first_update(self) -> int:
@@ -128,7 +140,7 @@ class Cycle:
 
     def weights(self) -> list[Arrays]:
         """The policy's layers, and `mean` and `deviation` of states, for each seed."""
-        layers = [parameter.detach().cpu().numpy() for parameter in self._sac.policy]
+        layers = [parameter.detach().cpu().numpy() for parameter in self._networks.policy]
         return [
             {f"policy.{i}": layer[k].copy() for i, layer in enumerate(layers)}
             | {"mean": self._states.mean[k].copy(), "deviation": self._states.deviation[k].copy()}
@@ -138,7 +150,7 @@ class Cycle:
     def state(self) -> Arrays:
         """Networks, optimiser, scales, and the current episodes."""
         arrays = {name: array.copy() for name, array in self._arrays().items()}
-        arrays |= {f"sac.{name}": array for name, array in self._sac.save().items()}
+        arrays |= {f"sac.{name}": array for name, array in self._networks.save().items()}
         arrays |= {f"engine.{name}": array for name, array in self._engine.save(self._ids).items()}
         return arrays | {"done": np.array([self.epoch, self._frames])}
 
@@ -157,7 +169,9 @@ class Cycle:
         """Continues from another trainer's `state`; fills the replay buffer again from its journals."""
         for name, array in self._arrays().items():
             array[...] = state[name]
-        self._sac.load({name.removeprefix("sac."): array for name, array in state.items() if name.startswith("sac.")})
+        self._networks.load(
+            {name.removeprefix("sac."): array for name, array in state.items() if name.startswith("sac.")}
+        )
         paths = [
             self._track.source.path(self._case(k, int(self._episodes[k]) - 1).setting) for k in range(len(self._ids))
         ]
@@ -218,7 +232,7 @@ class Cycle:
         """Starts the next episode of each agent of `agents` (n,); returns the first states (n, 48)."""
         cases = [self._case(int(k), int(self._episodes[k])) for k in agents]
         for k in agents:
-            draw = self._rng(self._seeds[k], HOLDING, int(self._episodes[k])).random()
+            draw = generator(self._seeds[k], HOLDING, int(self._episodes[k])).random()
             self._holds[k] = draw < self._exploration.share
         self._length[agents] = 0
         self._episodes[agents] += 1
@@ -226,39 +240,32 @@ class Cycle:
 
     def _case(self, agent: int, episode: int) -> Case:
         """The case of an agent's episode, by its number."""
-        rng = self._rng(self._seeds[agent], EPISODES, episode)
+        rng = generator(self._seeds[agent], EPISODES, episode)
         return self._track.cases[int(rng.integers(len(self._track.cases)))]
 
     def _act(self, noise: np.ndarray) -> np.ndarray:
         """Sampled actions (S, 1) in the current states."""
         scaled = np.clip((self._now - self._states.mean) / self._states.deviation, -CLIP, CLIP)
         states, noise_now = (self._tensor(array)[:, None] for array in (scaled, noise))
-        return self._sac.act(states, noise_now)[:, 0].double().cpu().numpy()
+        return self._networks.act(states, noise_now)[:, 0].double().cpu().numpy()
 
     def _batch(self, uniform: np.ndarray) -> Batch:
         """The scaled transitions that numbers (S, B) in [0, 1) select; demonstrations come first."""
         parts = self._replay.select(uniform[:, self._demonstrated :])
-        if self._demonstrated:
-            demos = self._select_demonstrations(uniform[:, : self._demonstrated])
+        if self._demonstrations:
+            demos = self._demonstrations.select(uniform[:, : self._demonstrated], self._frames)
             parts = Transitions(*(np.concatenate(pair, axis=1) for pair in zip(demos, parts, strict=True)))
         scale = self._states.mean, self._states.deviation
         mean, deviation = (array[:, None].astype(np.float32) for array in scale)
         both = np.concatenate([parts.states, parts.nexts], axis=1)
         scaled = self._tensor((both - mean) / deviation).clamp_(-CLIP, CLIP)
-        columns = (parts.actions, self._scaled_rewards(parts.rewards), ~parts.terminated)
-        actions, rewards, alive = (self._tensor(array)[..., None] for array in columns)
+        rewards = parts.rewards
+        if self._algorithm.scales_rewards:
+            rewards = np.clip(rewards / self._rewards.deviation, -CLIP, CLIP)
+        columns = (parts.actions, rewards, ~parts.terminated)
+        actions, rewards_now, alive = (self._tensor(array)[..., None] for array in columns)
         size = uniform.shape[1]
-        return Batch(scaled[:, :size], actions, rewards, scaled[:, size:], alive)
-
-    def _scaled_rewards(self, rewards: np.ndarray) -> np.ndarray:
-        """Rewards (S, B) as the networks learn them."""
-        return np.clip(rewards / self._rewards.deviation, -CLIP, CLIP)
-
-    def _select_demonstrations(self, uniform: np.ndarray) -> Transitions:
-        """Like `Replay.select`, from the demonstrations streamed so far."""
-        oldest = max(self._frames - CAPACITY, 0)
-        place = oldest + (uniform * (self._frames - oldest)).astype(int)
-        return self._demos.at(self._stream[self._ids[:, None], place])
+        return Batch(scaled[:, :size], actions, rewards_now, scaled[:, size:], alive)
 
     def _metrics(self, losses: list[Tensor], scores: list[list[float]]) -> list[dict[str, float]]:
         metrics: list[dict[str, float]] = [{"frames": self._frames, "episodes": len(returns)} for returns in scores]
@@ -267,21 +274,8 @@ class Cycle:
         if losses:
             means = torch.stack(losses).mean(dim=0).double().cpu().numpy()
             for k, values in enumerate(metrics):
-                values |= dict(zip(self.losses, means[:, k].tolist(), strict=True))
+                values |= dict(zip(self._algorithm.losses, means[:, k].tolist(), strict=True))
         return metrics
 
     def _tensor(self, array: np.ndarray) -> Tensor:
         return torch.tensor(array, dtype=torch.float32, device=self._track.device)
-
-    def _rng(self, seed: int, *stream: int) -> np.random.Generator:
-        return np.random.default_rng([seed, *stream])
-
-    def _uniform(self, stream: int, width: int) -> np.ndarray:
-        """Uniform numbers (FRAMES, S, width) in [0, 1) for this epoch, from one stream of each seed."""
-        draws = [self._rng(seed, stream, self.epoch).random((FRAMES, width)) for seed in self._seeds]
-        return np.stack(draws, axis=1)
-
-    def _normal(self, stream: int, width: int) -> np.ndarray:
-        """Standard normal numbers (FRAMES, S, width) for this epoch, from one stream of each seed."""
-        draws = [self._rng(seed, stream, self.epoch).standard_normal((FRAMES, width)) for seed in self._seeds]
-        return np.stack(draws, axis=1)

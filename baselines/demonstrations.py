@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
-from baselines.replay import Transitions
+from baselines.random_streams import DEMONSTRATIONS, generator
+from baselines.replay import CAPACITY, Transitions
 from dextron_bench import Case, ExpertAgent, Track, rollout
 from dextron_bench.storage import atomic, hashing, tensors
 from dextron_bench.world import model
@@ -49,6 +51,44 @@ class Demonstrations:
         drawn = drawn[: np.searchsorted(ends, length) + 1]
         begins = np.repeat(self.starts[drawn] - np.append(0, steps[drawn].cumsum()[:-1]), steps[drawn])
         return (begins + np.arange(len(begins)))[:length].astype(np.int32)
+
+
+@dataclass(frozen=True, slots=True)
+class Streamed:
+    """Demonstrations that each seed's expert plays beside its agent, one transition a frame: the paper's buffer."""
+
+    episodes: Demonstrations
+    rows: np.ndarray
+    """The transition (S, frames) of each frame."""
+
+    @classmethod
+    def draw(cls, episodes: Demonstrations, seeds: Sequence[int], frames: int) -> Self:
+        """Draws the order in which each seed's expert plays the episodes."""
+        return cls(episodes, np.stack([episodes.stream(generator(seed, DEMONSTRATIONS), frames) for seed in seeds]))
+
+    def select(self, uniform: np.ndarray, frames: int) -> Transitions:
+        """The transitions (S, B) that numbers (S, B) in [0, 1) select from the ones of the first `frames` frames."""
+        oldest = max(frames - CAPACITY, 0)
+        place = oldest + (uniform * (frames - oldest)).astype(int)
+        return self.episodes.at(self.rows[np.arange(len(self.rows))[:, None], place])
+
+
+@dataclass(frozen=True, slots=True)
+class Everything:
+    """All demonstrations, from the first frame on."""
+
+    episodes: Demonstrations
+    rows: np.ndarray
+    """The rows (n,) that begin a transition."""
+
+    @classmethod
+    def of(cls, episodes: Demonstrations) -> Self:
+        """All transitions of the episodes."""
+        return cls(episodes, episodes.transitions())
+
+    def select(self, uniform: np.ndarray, frames: int) -> Transitions:
+        """The transitions (S, B) that numbers (S, B) in [0, 1) select."""
+        return self.episodes.at(self.rows[(uniform * len(self.rows)).astype(int)])
 
 
 def load(track: Track, episodes: int | None = None) -> Demonstrations:

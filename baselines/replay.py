@@ -8,6 +8,8 @@ import numpy as np
 
 from baselines.policy import STATE
 
+CAPACITY = 1_000_000  # Transitions in either buffer (table II).
+
 
 class Transitions(NamedTuple):
     """Transitions of S agents: states and next states `nexts` (S, ..., 48); the other arrays (S, ...)."""

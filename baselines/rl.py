@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
+import torch
+from torch import Tensor
 
-from baselines.cycle import Cycle
+from baselines import cycle, demonstrations
 from baselines.policy import MeanAgent
-from baselines.schedule import SCHEDULES, Exploration, Scheduled
+from baselines.random_streams import BATCHES, NOISE, Draws
+from baselines.sac import BATCH, Batch, Sac
+from baselines.schedule import SCHEDULES, Exploration, Schedule, Scheduled
 from dextron_bench import Track, Trainer
 
 HELD_SHARE = 0.25  # Share of the episodes after the warm start that hold their noise, if `hold` is above 1.
@@ -51,8 +56,45 @@ class Rl(Scheduled):
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """A trainer with one SAC agent per seed, all trained together."""
         exploration = Exploration(self.hold, HELD_SHARE if self.hold > 1 else 0.0)
-        return Cycle(track, seeds, SCHEDULES[self.preset], self.demonstrated, exploration, self.critics)
+        return trainer(track, seeds, SCHEDULES[self.preset], self.demonstrated, exploration, self.critics)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
         """The agent that plays the policy's mean."""
         return MeanAgent(weights)
+
+
+class OneUpdate:
+    """The Algorithm of RL and RLIL: one update of soft actor-critic at each frame."""
+
+    losses = "action_value_loss", "value_loss", "policy_loss"
+    scales_rewards = True
+
+    def __init__(self, rngs: Sequence[np.random.Generator], device: str, critics: int) -> None:
+        self.networks, self._device = Sac(rngs, device, critics), device
+
+    def draw(self, draws: Draws) -> tuple[Any, ...]:
+        """Numbers that select transitions (FRAMES, S, B), and noises (FRAMES, S, B, 1)."""
+        noise = torch.tensor(draws.normal(NOISE, BATCH)[..., None], dtype=torch.float32, device=self._device)
+        return draws.uniform(BATCHES, BATCH), noise
+
+    def update(self, batch: Callable[[np.ndarray], Batch], drawn: Sequence[Any]) -> Tensor:
+        """Returns the losses (3, S)."""
+        uniform, noise = drawn
+        return self.networks.update(batch(uniform), noise)
+
+
+def trainer(
+    track: Track,
+    seeds: Sequence[int],
+    schedule: Schedule,
+    demonstrated: int = 0,
+    exploration: Exploration = Exploration(),  # noqa: B008 (frozen)
+    critics: int = 1,
+) -> cycle.Cycle:
+    """The trainer of RL, or of RLIL if some transitions of a batch are `demonstrated`."""
+    experts = None
+    if demonstrated:
+        episodes = demonstrations.load(track, schedule.episodes)
+        experts = demonstrations.Streamed.draw(episodes, seeds, schedule.epochs * cycle.FRAMES)
+    algorithm = partial(OneUpdate, critics=critics)
+    return cycle.Cycle(track, seeds, schedule, algorithm, experts, demonstrated, exploration)

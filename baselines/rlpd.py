@@ -6,8 +6,9 @@ learned, so that the policy keeps an entropy.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,10 +17,11 @@ from torch import Tensor
 from torch.nn.functional import layer_norm
 
 from baselines import demonstrations, policy, snapshot
-from baselines.cycle import BATCHES, NOISE, Cycle
+from baselines.cycle import Cycle
+from baselines.demonstrations import Everything
 from baselines.networks import HIDDEN, Stack
 from baselines.policy import STATE, MeanAgent
-from baselines.replay import Transitions
+from baselines.random_streams import BATCHES, NOISE, PAIRS, Draws
 from baselines.sac import DISCOUNT, LEARNING_RATE, Batch, action_value_target
 from baselines.schedule import SCHEDULES, Scheduled
 from dextron_bench import Track, Trainer
@@ -27,7 +29,6 @@ from dextron_bench import Track, Trainer
 WARM_START = 1000  # Frames with random actions, before the first update.
 POLYAK = 0.005
 ENTROPY = -0.5  # Of the policy, which the temperature keeps: minus half of the number of actions.
-PAIRS = 9  # A random stream of each seed; 0 to 7 belong to `Cycle`.
 
 
 class BadEnsemble(ValueError):
@@ -65,56 +66,40 @@ class Rlpd(Scheduled):
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """A trainer with one agent per seed, all trained together."""
-        return SymmetricCycle(track, seeds, self)
+        schedule = replace(SCHEDULES[self.preset], warm_start=WARM_START)
+        experts = Everything.of(demonstrations.load(track, schedule.episodes))
+        return Cycle(track, seeds, schedule, partial(SeveralUpdates, method=self), experts, self.demonstrated)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
         """The agent that plays the policy's mean."""
         return MeanAgent(weights)
 
 
-class SymmetricCycle(Cycle):
-    """The Trainer of RLPD: the cycle of RL, with half of each batch from all demonstrations, and several updates."""
+class SeveralUpdates:
+    """The Algorithm of RLPD: several updates of an ensemble of Q at each frame, and one of the policy."""
 
     losses = "action_value_loss", "policy_loss", "temperature"
+    scales_rewards = False  # The learned temperature fits any scale.
 
-    def __init__(self, track: Track, seeds: Sequence[int], method: Rlpd) -> None:
-        self._method = method
-        schedule = replace(SCHEDULES[method.preset], warm_start=WARM_START)
-        super().__init__(track, seeds, schedule, method.demonstrated, critics=method.critics)
+    def __init__(self, rngs: Sequence[np.random.Generator], device: str, method: Rlpd) -> None:
+        self.networks, self._device, self._method = Ensemble(rngs, device, method.critics), device, method
 
-    def _make_networks(self, rngs: Sequence[np.random.Generator], critics: int) -> Ensemble:
-        return Ensemble(rngs, self._track.device, critics)
-
-    def _load_demonstrations(self) -> None:
-        self._demos = demonstrations.load(self._track, self._schedule.episodes)
-        self._demonstrated_rows = self._demos.transitions()
-
-    def _select_demonstrations(self, uniform: np.ndarray) -> Transitions:
-        """Like `Replay.select`, from all demonstrations."""
-        return self._demos.at(self._demonstrated_rows[(uniform * len(self._demonstrated_rows)).astype(int)])
-
-    def _scaled_rewards(self, rewards: np.ndarray) -> np.ndarray:
-        return rewards  # The learned temperature fits any scale.
-
-    def _draw(self) -> tuple[Any, ...]:
-        """Numbers that select transitions (FRAMES, S, G B), noises (FRAMES, S, (G + 1) B), and orders of the Q."""
+    def draw(self, draws: Draws) -> tuple[Any, ...]:
+        """Numbers that select transitions (FRAMES, S, G B), noises (FRAMES, S, (G + 1) B, 1), and orders of the Q."""
         updates, batch, critics = self._method.updates, self._method.batch, self._method.critics
-        selecting = self._uniform(BATCHES, updates * batch)
-        noise = self._tensor(self._normal(NOISE, (updates + 1) * batch)[..., None])
-        orders = (
-            self._uniform(PAIRS, updates * critics).reshape(*selecting.shape[:2], updates, critics).argsort(axis=-1)
-        )
-        return selecting, noise, orders
+        selecting = draws.uniform(BATCHES, updates * batch)
+        noise = draws.normal(NOISE, (updates + 1) * batch)[..., None]
+        orders = draws.uniform(PAIRS, updates * critics).reshape(*selecting.shape[:2], updates, critics)
+        return selecting, torch.tensor(noise, dtype=torch.float32, device=self._device), orders.argsort(axis=-1)
 
-    def _update(self, drawn: Sequence[Any]) -> Tensor:
-        """The updates of a frame, with its random numbers; returns the losses (3, S)."""
+    def update(self, batch: Callable[[np.ndarray], Batch], drawn: Sequence[Any]) -> Tensor:
+        """Returns the losses (3, S)."""
         uniform, noise, orders = drawn
-        assert isinstance(self._sac, Ensemble)
         *noises, last = noise.split(self._method.batch, dim=1)
-        batches = [self._batch(part) for part in np.split(uniform, self._method.updates, axis=1)]
+        batches = [batch(part) for part in np.split(uniform, self._method.updates, axis=1)]
         parts = zip(batches, noises, orders[..., :2].swapaxes(0, 1), strict=True)
-        losses = [self._sac.update_values(*part) for part in parts]
-        return torch.cat([torch.stack(losses).mean(dim=0)[None], self._sac.update_policy(batches[-1].states, last)])
+        losses = [self.networks.update_values(*part) for part in parts]
+        return torch.cat([torch.stack(losses).mean(dim=0)[None], self.networks.update_policy(batches[-1].states, last)])
 
 
 def action_values(parameters: Sequence[Tensor], states: Tensor, actions: Tensor) -> Tensor:

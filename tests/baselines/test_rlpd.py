@@ -10,8 +10,8 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from baselines import rlpd
-from baselines.rlpd import BadEnsemble, Ensemble, Rlpd, SymmetricCycle
+from baselines import cycle, demonstrations, rlpd
+from baselines.rlpd import BadEnsemble, Ensemble, Rlpd
 from baselines.sac import Batch
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import Track
@@ -113,18 +113,20 @@ def test_seeds_trained_together_equal_seeds_trained_alone():
 def test_half_of_a_batch_comes_from_all_demonstrations(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """From the first update on; the paper's RLIL has only the demonstrations that were streamed so far."""
     cases = [Case(Setting(*row[:4]), Expert(*row[4:6]), row[6]) for row in SOLVED]
-    trainer = SymmetricCycle(Track(SOURCE, cases, tmp_path, threads=1), [0], Rlpd(batch=8))
-    rows = trainer._demonstrated_rows
-    demos = trainer._select_demonstrations(np.array([[0.0, 0.5, 1.0 - 1e-9]]))
+    track = Track(SOURCE, cases, tmp_path, threads=1)
+    demos, trainer = demonstrations.load(track), Rlpd(batch=8).trainer(track, [0])
+    assert isinstance(trainer, cycle.Cycle)
+    rows = demos.transitions()
+    first = demonstrations.Everything.of(demos).select(np.array([[0.0, 0.5, 1.0 - 1e-9]]), frames=0)
     expected = rows[[0, len(rows) // 2, len(rows) - 1]]
-    np.testing.assert_array_equal(demos.states[0], trainer._demos.states[expected])
-    np.testing.assert_array_equal(demos.nexts[0], trainer._demos.states[expected + 1])
-    monkeypatch.setattr("baselines.cycle.FRAMES", 3)
+    np.testing.assert_array_equal(first.states[0], demos.states[expected])
+    np.testing.assert_array_equal(first.nexts[0], demos.states[expected + 1])
+    monkeypatch.setattr(cycle, "FRAMES", 3)
     trainer.advance()
-    rewarded = np.flatnonzero(trainer._demos.rewards[rows] > 0.0)[0]
+    rewarded = np.flatnonzero(demos.rewards[rows] > 0.0)[0]
     made = trainer._batch(np.full((1, 8), (rewarded + 0.5) / len(rows)))
     assert made.rewards[0, :, 0].tolist() == [1.0] * 4 + [0.0] * 4  # They are not scaled.
-    action = float(trainer._demos.actions[rows[rewarded]])
+    action = float(demos.actions[rows[rewarded]])
     assert made.actions[0, :4, 0].tolist() == [action] * 4
     assert (made.actions[0, 4:, 0] != action).all()
 

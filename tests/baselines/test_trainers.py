@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from baselines import cycle, stopping_trainer
+from baselines import cycle, rl, stopping_trainer
 from baselines.bc import Cloning, imitation_loss
-from baselines.cycle import Cycle
 from baselines.dagger import Aggregation
 from baselines.demonstrations import load
 from baselines.policy import MeanAgent
@@ -48,8 +47,8 @@ def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: 
     if kind == "rlpd":
         return Rlpd(critics=3, updates=2, batch=16).trainer(track, seeds)
     if kind == "held":
-        return Cycle(track, seeds, schedule, 9, Exploration(hold=7, share=0.5), critics=2)
-    return Cycle(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
+        return rl.trainer(track, seeds, schedule, 9, Exploration(hold=7, share=0.5), critics=2)
+    return rl.trainer(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +137,7 @@ def test_updates_start_after_the_warm_start(tmp_path: Path):
     assert second["frames"] == 2 * FRAMES
     assert "value_loss" in first
     assert "value_loss" in second
-    late = Cycle(Track(SOURCE, CASES, tmp_path, threads=1), [0], Schedule(2, 100, 1), 0)
+    late = rl.trainer(Track(SOURCE, CASES, tmp_path, threads=1), [0], Schedule(2, 100, 1), 0)
     before = late.weights()[0]["policy.4"]
     assert "value_loss" not in late.advance()[0]
     np.testing.assert_array_equal(late.weights()[0]["policy.4"], before)
@@ -147,7 +146,7 @@ def test_updates_start_after_the_warm_start(tmp_path: Path):
 def test_held_noise_is_renewed_every_hold_steps_and_updates_begin_after_a_batch(tmp_path: Path):
     """In the warm start the noise is the action, so the actions themselves are held, from the start of each episode."""
     track = Track(SOURCE, CASES, tmp_path, threads=1)
-    learner = Cycle(track, [0], Schedule(4, 400, 1), 0, Exploration(hold=7))
+    learner = rl.trainer(track, [0], Schedule(4, 400, 1), 0, Exploration(hold=7))
     (metrics,) = learner.advance()
     assert "value_loss" in metrics
     journal = learner.journal()
@@ -162,7 +161,7 @@ def test_after_the_warm_start_a_share_of_the_episodes_holds_its_noise(tmp_path: 
     track = Track(SOURCE, CASES, tmp_path, threads=1)
     noises = []
     for share in (0.0, 1.0):
-        learner = Cycle(track, [0], Schedule(4, 0, 1), 0, Exploration(hold=40, share=share))
+        learner = rl.trainer(track, [0], Schedule(4, 0, 1), 0, Exploration(hold=40, share=share))
         fresh = np.random.default_rng(0).normal(size=(40, 1, 1))
         held = []
         for noise in fresh:

@@ -13,7 +13,8 @@ import torch
 from pytest_benchmark.fixture import BenchmarkFixture
 from safetensors.numpy import save_file
 
-from baselines.cycle import FRAMES, Cycle
+from baselines import rl
+from baselines.cycle import FRAMES
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import Schedule
 from dextron_bench.methods.learners import Track
@@ -78,7 +79,7 @@ def test_updates(benchmark: BenchmarkFixture, agents: int, aim: float | None) ->
 @pytest.mark.parametrize("agents", [1, 3])
 def test_cycles(benchmark: BenchmarkFixture, agents: int, tmp_path: Path) -> None:
     track = Track(default_source(), draw_cases(24), tmp_path)
-    trainer = Cycle(track, range(agents), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
+    trainer = rl.trainer(track, range(agents), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
     trainer.advance()
     trainer.journal()
     rounds = max(1, round(3 * min(1.0, scaled(100) / 100)))
