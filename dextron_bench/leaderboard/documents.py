@@ -6,6 +6,7 @@ A number stands in a Markdown file between two comments, `<!--=KEY-->` and `<!--
 | --- | --- |
 | `METHOD REACHES SPLIT return` | mean return of a row of the leaderboard, such as 17.6 |
 | `METHOD REACHES SPLIT success` | success rate of that row [%] |
+| `METHOD REACHES SPLIT seeds` | success rate of each of its seeds [%] |
 | `results REACHES` | a table of all methods on a source: mean return and success rate [%] on each split |
 | `METHOD REACHES SPLIT CAUSE` | share of its episodes that end with a cause [%]; `-` stands for a blank |
 | `search REACHES draws`, `settings`, `kept`, `solved` | a count of the search for experts |
@@ -72,8 +73,12 @@ def _values(board: Path) -> Callable[[str], str]:
     """The text of each key."""
 
     @cache
+    def results() -> list[dict[str, Any]]:
+        return list(result_files.results(board / RESULTS))
+
+    @cache
     def rows() -> pd.DataFrame:
-        return standings.table(result_files.results(board / RESULTS))
+        return standings.table(results())
 
     def value(key: str) -> str:
         match key.split():
@@ -94,6 +99,8 @@ def _values(board: Path) -> Callable[[str], str]:
             case ["split", reaches, name, "narrow"]:
                 cases = load_split(reaches, name).cases
                 return f"{100 * sum(case.window <= hard.WINDOW for case in cases) / len(cases):.1f}"
+            case [method, reaches, split, "seeds"]:
+                return _of_seeds(results(), method, reaches, split)
             case [method, reaches, split, name]:
                 return _of_row(rows(), method, reaches, split, name)
         raise KeyError(key)
@@ -111,6 +118,18 @@ def _of_row(rows: pd.DataFrame, method: str, reaches: str, split: str, name: str
         return f"{row['return']:.1f}"
     share = row["success"] if name == "success" else row[name.replace("-", " ")] / row["episodes"]
     return f"{100 * share:.1f}"
+
+
+def _of_seeds(results: Iterable[Mapping[str, Any]], method: str, reaches: str, split: str) -> str:
+    """The success rates of the seeds of a method on a split [%], in the order of the seeds."""
+    seeds = {
+        result["seed"]: result["splits"][split]["causes"].get("solved", 0) / len(result["splits"][split]["scores"])
+        for result in results
+        if (result["method"], result["reaches"]) == (method, reaches) and split in result["splits"]
+    }
+    if not seeds:
+        raise KeyError("the leaderboard has no such row")
+    return ", ".join(f"{100 * seeds[seed]:.1f}" for seed in sorted(seeds))
 
 
 def _results(rows: pd.DataFrame, reaches: str) -> str:

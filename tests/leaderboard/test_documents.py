@@ -18,11 +18,15 @@ ENDINGS = dict.fromkeys(CAUSES, 0) | {"solved": 2, "too early": 1, "slipped": 1}
 
 @pytest.fixture
 def board(tmp_path: Path) -> Path:
-    """A leaderboard with one result: four episodes, a mean return of 11.75, half of them solved."""
-    split = {"digest": "0" * 64, "scores": SCORES, "failed": 0, "causes": ENDINGS, "closing_lag": None}
-    result = {"method": "mine", "reaches": "real", "seed": 0, "splits": {"test": split}, "provenance": {}}
-    atomic.write_json(tmp_path / "results/mine/real/seed0/result.json", result)
+    """A leaderboard with a method of one seed: four episodes, a mean return of 11.75, half of them solved."""
+    add_seed(tmp_path, 0, SCORES, ENDINGS)
     return tmp_path
+
+
+def add_seed(board: Path, seed: int, scores: list[float], endings: dict[str, int]) -> None:
+    split = {"digest": "0" * 64, "scores": scores, "failed": 0, "causes": endings, "closing_lag": None}
+    result = {"method": "mine", "reaches": "real", "seed": seed, "splits": {"test": split}, "provenance": {}}
+    atomic.write_json(board / f"results/mine/real/seed{seed}/result.json", result)
 
 
 def filled(board: Path, text: str) -> str:
@@ -47,6 +51,12 @@ def number(key: str) -> str:
 )
 def test_a_number_is_replaced_by_its_present_value(board: Path, key: str, expected: str):
     assert filled(board, f"before {number(key)} after") == f"before <!--={key}-->{expected}<!--.--> after"
+
+
+def test_the_success_rates_of_the_seeds(board: Path):
+    add_seed(board, 2, [0.0, 0.0, 0.0, 0.0], {"slipped": 4})
+    add_seed(board, 1, [20.0, 20.0, 20.0, 3.0], {"solved": 3, "too late": 1})
+    assert ">50.0, 75.0, 0.0<" in filled(board, number("mine real test seeds"))
 
 
 def test_a_table_of_the_results_on_a_source(board: Path):
@@ -78,7 +88,15 @@ def test_filling_again_changes_nothing(board: Path):
 
 
 @pytest.mark.parametrize(
-    "key", ["nonsense", "results synthetic", "other real test return", "mine real test speed", "search real speed"]
+    "key",
+    [
+        "nonsense",
+        "results synthetic",
+        "other real test return",
+        "other real test seeds",
+        "mine real test speed",
+        "search real speed",
+    ],
 )
 def test_a_key_that_names_nothing_is_refused_and_the_file_stays(board: Path, key: str):
     with pytest.raises(documents.UnknownNumber, match="names no number"):
