@@ -30,6 +30,7 @@ LEVELS = {
     "leaderboard": 8,
     "sweeps": 8,
     "browse": 9,
+    "cluster": 9,
     "cli": 10,
 }
 SDKS = {  # Packages of others that one place alone imports.
@@ -43,6 +44,7 @@ SDKS = {  # Packages of others that one place alone imports.
     "wandb": "dextron_bench/tracking/to_wandb.py",
     "tyro": "dextron_bench/cli/",
     "rich": "dextron_bench/cli/",
+    "ray": "dextron_bench/cluster/ray_cluster.py",
     "optuna": "dextron_bench/sweeps/optuna_search.py",
 }
 TOP = ("dextron_bench/__init__.py", "dextron_bench/__main__.py")  # Above all levels.

@@ -40,7 +40,7 @@ PACKAGES = (
 )
 EXTRAS = {  # By package: the extra that installs it.
     **{"minari": "minari", "av": "video", "onnxruntime": "onnx", "optuna": "sweep"},
-    **{"tensorboard": "tensorboard", "trackio": "trackio", "wandb": "wandb"},
+    **{"tensorboard": "tensorboard", "trackio": "trackio", "wandb": "wandb", "ray": "cluster"},
 }
 RENDERERS = ("egl", "osmesa", "glfw")
 TIMEOUT = 30.0  # [s] for one renderer.

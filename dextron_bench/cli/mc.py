@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli import shares
+from dextron_bench.cli import clusters, shares
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
+
+if TYPE_CHECKING:
+    from dextron_bench.experts import montecarlo
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,10 @@ class MonteCarlo:
     """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
     merge: bool = False
     """Only put together what shares have done; if anything is missing, this is an error that names it."""
+    cluster: clusters.Flag = ""
+    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
-    """Threads of the simulation; 0 means one per processor."""
+    """Threads of the simulation; 0 means one per processor. On a cluster: of a piece, and 0 means one."""
     extend: bool = False
     """Start from the shipped database of this source of reaches, not from an empty one."""
     runs: Path = Path("runs")
@@ -50,6 +55,7 @@ class MonteCarlo:
         from dextron_bench.world.engine import Engine
 
         share = shares.parse(self.share, self.merge)
+        clusters.check(self.cluster, self.share, self.merge)
         search = montecarlo.Search(self.reaches, self.seed)
         folder = self.runs / "mc" / self.reaches / f"seed{self.seed}"
         source = open_source(self.reaches)
@@ -64,11 +70,22 @@ class MonteCarlo:
             return shares.print_done(share, f"{count} blocks", folder)
         if self.merge:
             montecarlo.check_complete(search, folder, self.rows)
+        if self.cluster:
+            self._play_on_cluster(search, folder)
         with progress_bar("rows of return 20", self.quiet) as progress:
             draws = montecarlo.run(source, search, folder, self.rows, engine, progress)
         file, summary = database.save(draws, source, search, folder, f"experts-{self.reaches}")
         print_json(summary) if self.json else self._print(summary, file)
         return DONE
+
+    def _play_on_cluster(self, search: montecarlo.Search, folder: Path) -> None:
+        from dextron_bench.cluster import searches
+
+        with (
+            clusters.connected(self.cluster, self.runs, self.threads) as cluster,
+            progress_bar("rows of return 20", self.quiet) as progress,
+        ):
+            searches.play_blocks(cluster, search, folder, self.runs, self.rows, progress)
 
     def _print(self, summary: dict[str, Any], file: Path) -> None:
         columns = ["by", "value", "draws", "kept", "solved", "kept [%]", "solved [%]"]

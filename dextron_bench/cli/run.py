@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from dextron_bench.cli import shares
+from dextron_bench.cli import clusters, shares
 from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.leaderboard import print_rows
 from dextron_bench.cli.method_flags import settings_dict
@@ -57,8 +57,11 @@ class Run:
     """Show the training in Rerun's viewer while it runs."""
     runs: Path = Path("runs")
     """Folder of all runs."""
+    cluster: clusters.Flag = ""
+    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
-    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
+    """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
+    depend on it."""
     device: Literal["cpu", "cuda", "auto"] = "cpu"
     """The device for training; auto uses a GPU if there is one. The last bits of the weights depend on it."""
     share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
@@ -78,6 +81,7 @@ class Run:
             from dextron_bench.tracking import packages
 
             packages.require(self.tracker)
+        clusters.check(self.cluster, self.share, self.merge)
         share, groups = shares.parse(self.share, self.merge), self._groups()
         if self.dry_run:
             return self._estimate(groups)
@@ -85,6 +89,8 @@ class Run:
             return self._play(share, groups)
         if self.merge:
             shares.check_jobs(self._jobs(groups))
+        if self.cluster:
+            self._play_on_cluster(groups)
         return self._execute(groups)
 
     def _jobs(self, groups: list[list[plans.Run]]) -> list[EvaluationJob]:
@@ -95,6 +101,16 @@ class Run:
     def _play(self, share: shares.Share, groups: list[list[plans.Run]]) -> int:
         """Plays the pieces of a share."""
         return shares.play_jobs(self._jobs(groups), share, self.runs, self.quiet)
+
+    def _play_on_cluster(self, groups: list[list[plans.Run]]) -> None:
+        """Trains and plays on a cluster what the folder of runs lacks."""
+        from dextron_bench.cluster import evaluations, trainings
+
+        with clusters.connected(self.cluster, self.runs, self.threads) as cluster:
+            with progress_bar("epochs", self.quiet) as progress:
+                trainings.train(cluster, groups, self.runs, self.device, progress)
+            with progress_bar("pieces", self.quiet) as progress:
+                evaluations.play(cluster, [run for group in groups for run in group], self.runs, progress)
 
     def _groups(self) -> list[list[plans.Run]]:
         """The runs of each method, one for each seed."""

@@ -68,11 +68,11 @@ def piece_config(search: dict[str, Any]) -> dict[str, Any]:
     return {"search": search, "physics": model.mjcf_hash()}
 
 
-def write_piece(search: dict[str, Any], folder: Path, number: int, draws: pd.DataFrame) -> None:
-    """Writes a block as a piece of a share."""
+def write_piece(search: dict[str, Any], folder: Path, number: int, draws: pd.DataFrame) -> list[Path]:
+    """Writes a block as a piece of a share; returns its file and its stamp."""
     file = work(folder).file(_name(number), ".parquet")
     tables.write(file, draws, compression="zstd")
-    work(folder).write(_name(number), piece_config(search), [file])
+    return [file, work(folder).write(_name(number), piece_config(search), [file])]
 
 
 def take_pieces(search: dict[str, Any], folder: Path) -> None:

@@ -120,6 +120,11 @@ def run_share(
     return sum(share.has(number) for number in done)
 
 
+def play_piece(source: setting.Source, search: Search, folder: Path, number: int, engine: Engine) -> list[Path]:
+    """Plays one block of a search as a piece in a folder; returns its file and its stamp."""
+    return blocks.write_piece(asdict(search), folder, *next(_played(source, search, engine, [number], ())))
+
+
 def check_complete(search: Search, folder: Path, rows: int) -> None:
     """Raises MissingPieces if blocks are missing for `rows` solved rows, and the errors of `shares.Work.read`."""
     blocks.read_pieces(asdict(search), folder)

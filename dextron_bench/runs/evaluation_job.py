@@ -64,18 +64,23 @@ class EvaluationJob:
         """All pieces, in order; they do not depend on what is done already."""
         return [piece for split in self.splits for piece in self._pieces_of(split)]
 
+    def config_of(self, piece: RowPiece) -> dict[str, Any]:
+        """What the files of a piece depend on."""
+        recorded = sum(row < self.record for row in piece.rows)
+        return {**self.config, "split": piece.split.digest, "recorded episodes": recorded}
+
     def done(self) -> set[str]:
         """Names of the pieces whose episodes are in the folder; raises the errors of `Work.read`, and DamagedFile."""
         table = run_files.stored_episodes(self.folder, self.splits)
         complete = {split.name for split in self.splits if self._is_stored(split, table)}
         return {piece.name for piece in self.pieces() if piece.split.name in complete} | self._stored_pieces().keys()
 
-    def play_piece(self, piece: RowPiece, report: Progress = no_progress) -> None:
-        """Plays a piece and writes its files; `report` receives episodes."""
+    def play_piece(self, piece: RowPiece, report: Progress = no_progress) -> list[Path]:
+        """Plays a piece and writes its files; returns them, the stamp last. `report` receives episodes."""
         rows, files = self._play_rows(piece.split, piece.rows, recording_files.write, report)
         table = self._work.file(piece.name, ".parquet")
         tables.write(table, pd.DataFrame(rows))
-        self._work.write(piece.name, self._config_of(piece), [table, *files])
+        return [*files, table, self._work.write(piece.name, self.config_of(piece), [table, *files])]
 
     def table(self, report: Progress = no_progress) -> pd.DataFrame:
         """The table of episodes; plays what the folder lacks, and stores the table after each split.
@@ -102,18 +107,13 @@ class EvaluationJob:
         starts = range(0, len(split.cases), size)
         return [RowPiece(split, range(start, min(start + size, len(split.cases)))) for start in starts]
 
-    def _config_of(self, piece: RowPiece) -> dict[str, Any]:
-        """What the files of a piece depend on."""
-        recorded = sum(row < self.record for row in piece.rows)
-        return {**self.config, "split": piece.split.digest, "recorded episodes": recorded}
-
     def _is_stored(self, split: Split, table: pd.DataFrame) -> bool:
         """True if the table has a split's episodes, and the folder has their recordings."""
         stored = table[table["split"] == split.name] if len(table) else table
         return len(stored) == len(split.cases) and not recording_files.any_missing(self.folder, stored, self.record)
 
     def _stored_pieces(self) -> dict[str, shares.Piece]:
-        return self._work.read({piece.name: self._config_of(piece) for piece in self.pieces()}.get)
+        return self._work.read({piece.name: self.config_of(piece) for piece in self.pieces()}.get)
 
     def _rows_of_split(self, split: Split, pieces: dict[str, shares.Piece], report: Progress) -> list[dict[str, Any]]:
         """The rows of all episodes of a split, in order: from its pieces, and played where there are none."""
@@ -123,7 +123,7 @@ class EvaluationJob:
         for part in parts:
             if part.name not in pieces:
                 self.play_piece(part, report)
-                pieces |= self._work.read({part.name: self._config_of(part)}.get)
+                pieces |= self._work.read({part.name: self.config_of(part)}.get)
         return [row for part in parts for row in self._rows_of_piece(part.name, pieces[part.name])]
 
     def _rows_of_piece(self, name: str, piece: shares.Piece) -> list[dict[str, Any]]:

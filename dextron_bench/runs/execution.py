@@ -68,15 +68,15 @@ def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
     """
     splits = [load_split(run.source, name) for name in run.splits]
     source, folder = sources.open_source(run.source), run.folder(runs)
-    weights_file = _weights_file(run, runs)
-    if weights_file and not weights_file.exists():
+    file = weights_file(run, runs)
+    if file and not file.exists():
         raise NotTrained(
-            f"{run.label} is not trained for seed {run.seed}: {weights_file} is missing, and a share or a merge trains "
+            f"{run.label} is not trained for seed {run.seed}: {file} is missing, and a share or a merge trains "
             "nothing; train it first with `--split val` and without --share, and copy the folder of runs"
         )
-    player = agent(run, weights_file)  # If this raises, there is no folder yet.
+    player = agent(run, file)  # If this raises, there is no folder yet.
     folder_config.write_or_check(folder.path, run.config())
-    copy = run_files.copy_weights(weights_file, folder) if weights_file else None
+    copy = run_files.copy_weights(file, folder) if file else None
 
     def play(split: Split, rows: range) -> Played:
         cases, bottles = split.cases[rows.start : rows.stop], split.bottles_of(rows)
@@ -110,7 +110,7 @@ def agent(run: Run, file: Path | None) -> Agent:
         return run.method.agent(run.seed)
 
 
-def _weights_file(run: Run, runs: Path) -> Path | None:
+def weights_file(run: Run, runs: Path) -> Path | None:
     """The file of weights that a run acts with; None for a method that does not learn."""
     if job := run.training_job(runs):
         return job.run_folder(run.seed).weights

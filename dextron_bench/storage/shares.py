@@ -94,8 +94,8 @@ class Work:
         """The place for the file of a piece."""
         return self.folder / FOLDER / f"{name}{suffix}"
 
-    def write(self, name: str, config: Mapping[str, Any], files: Iterable[Path]) -> None:
-        """Writes the stamp of a piece whose files are complete. They lie below the folder of the work.
+    def write(self, name: str, config: Mapping[str, Any], files: Iterable[Path]) -> Path:
+        """Writes the stamp of a piece whose files are complete, and returns it. They lie below the folder of the work.
 
         `config` is everything that the piece depends on besides the code; it contains the hash of the physics.
         """
@@ -106,7 +106,8 @@ class Work:
             "files": {file.relative_to(self.folder).as_posix(): hashing.sha256(file) for file in files},
             "provenance": provenance.collect(config["physics"]),
         }
-        atomic.write_json(self.file(name, ".json"), stamp)
+        atomic.write_json(file := self.file(name, ".json"), stamp)
+        return file
 
     def read(self, config_of: Callable[[str], Mapping[str, Any] | None]) -> dict[str, Piece]:
         """The pieces that are there, by name. `config_of` returns what a piece depends on, or None to leave it out.

@@ -13,7 +13,7 @@ from dextron_bench.cli import doctor, main
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
 # Extras; the others are for developers.
-FOR_USERS = ("minari", "video", "onnx", "sweep", "tensorboard", "trackio", "wandb")
+FOR_USERS = ("minari", "video", "onnx", "sweep", "tensorboard", "trackio", "wandb", "cluster")
 
 
 def names(requirements: list[str]) -> set[str]:

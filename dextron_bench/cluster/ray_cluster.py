@@ -1,0 +1,193 @@
+"""Tasks on Ray, on this machine or on many; the only importer of Ray, which is in the extra `cluster`."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import pickle
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from dextron_bench.cluster import installation, worker
+from dextron_bench.cluster.tasks import BadCluster, OtherVersion, PieceFailed, Reply, Task, write_files
+from dextron_bench.storage import hashing
+from dextron_bench.storage.progress import Progress, no_progress
+
+LOCAL, AUTO, REMOTE = "local", "auto", "ray://"
+START = "start one with `ray start --head`, or use --cluster local"
+WAITING = 2.0  # Tasks in the cluster for each that can run, so that no processor waits for the driver.
+PERIOD = 1.0  # [s] at most until nodes that have joined get tasks.
+LOSSES = 5  # A piece that has lost so many nodes is given up.
+PERFORM = worker.perform  # What every task calls on its node.
+
+Next = Callable[[int], Task | None]  # Receives how many tasks are under way.
+Done = Callable[
+    [Task], bool
+]  # Receives a task whose files are written; True ends the work, and the others are cancelled.
+
+
+def check_flag(text: str) -> None:
+    """Raises BadCluster if a text names no cluster, or if Ray is not installed; imports nothing."""
+    if text not in (LOCAL, AUTO) and not text.startswith(REMOTE):
+        raise BadCluster(f"--cluster {text!r} is none of local, auto and ray://HOST:PORT")
+    if importlib.util.find_spec("ray") is None:
+        raise BadCluster("--cluster needs Ray: `pip install 'dextron-bench[cluster]'`")
+
+
+class RayCluster:
+    """A connection to Ray, for the tasks of one command, whose files are written below a folder of runs.
+
+    `losses` counts the tasks that were done again because their node was lost.
+    """
+
+    def __init__(self, address: str, runs: Path, threads: int = 0) -> None:
+        check_flag(address)
+        self.threads = threads or 1  # Of a task: one uses the processors best.
+        self.losses = 0
+        self._address, self._runs = address, runs
+        self._contents: dict[str, Any] = {}  # References to the contents of inputs, by SHA-256.
+        self._under_way: dict[Any, Task] = {}
+        self._lost: dict[str, int] = {}  # By name of the task: how many nodes it has lost.
+
+    def __enter__(self) -> RayCluster:
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+        self._ray = importlib.import_module("ray")
+        with _without_messages():
+            self._connect()
+        self._perform = self._ray.remote(PERFORM)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        with _without_messages():
+            self._ray.shutdown()
+
+    def run(self, next_task: Next, done: Done) -> None:
+        """Does all tasks that `next_task` returns, until it returns None while none is under way.
+
+        The tasks of a node that is lost are done again. If the work ends early, by `done` or an error, the tasks under
+        way are cancelled. Raises PieceFailed, OtherVersion, BadCluster, DamagedFile.
+        """
+        again: deque[Task] = deque()
+        with _without_messages():
+            try:
+                while self._fill(next_task, again):
+                    for task, reply in self._replies():
+                        if reply is None:
+                            again.append(task)
+                            continue
+                        write_files(reply.files, self._runs)
+                        if done(task):
+                            return
+            finally:
+                for reference in self._under_way:
+                    self._ray.cancel(reference)
+                self._under_way.clear()
+
+    def run_all(self, tasks: Sequence[Task], progress: Progress = no_progress) -> None:
+        """Does tasks; `progress` receives how many are done. Raises the errors of `run`."""
+        left, count = deque(tasks), 0
+        progress(count, len(tasks))
+
+        def done(_: Task) -> bool:
+            nonlocal count
+            count += 1
+            progress(count, len(tasks))
+            return False
+
+        self.run(lambda _: left.popleft() if left else None, done)
+
+    def _fill(self, next_task: Next, again: deque[Task]) -> bool:
+        """Submits tasks while there is room, the tasks of lost nodes first; False if none is under way then."""
+        room = self._room()
+        while len(self._under_way) < room:
+            task = again.popleft() if again else next_task(len(self._under_way))
+            if task is None:
+                break
+            self._submit(task)
+        return bool(self._under_way)
+
+    def _connect(self) -> None:
+        """Starts Ray on this machine, or connects to a cluster; raises BadCluster."""
+        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "CRITICAL"}
+        try:
+            if self._address == LOCAL:
+                self._ray.init("local", include_dashboard=False, **quiet)
+            else:
+                self._ray.init(self._address, **quiet)
+        except ConnectionError as error:
+            remedy = (
+                "start one with `ray start --head`, or use --cluster local" if self._address == AUTO else str(error)
+            )
+            raise BadCluster(
+                f"no Ray cluster answers at --cluster {self._address}: {' '.join(remedy.split())}"
+            ) from error
+
+    def _room(self) -> int:
+        """How many tasks to have in the cluster at once; raises BadCluster if no node has the processors of a task."""
+        processors = [node["Resources"].get("CPU", 0.0) for node in self._ray.nodes() if node["Alive"]]
+        if max(processors, default=0.0) < self.threads and sum(processors):
+            raise BadCluster(
+                f"a task needs {self.threads} processors, and the largest node has {max(processors):.0f}: use a "
+                "smaller --threads"
+            )
+        return max(1, int(WAITING * sum(number // self.threads for number in processors)))
+
+    def _submit(self, task: Task) -> None:
+        """Sends a task to the cluster. Ray itself never tries again: only the driver knows why a task ended."""
+        hashes = {place: hashing.sha256(file) for place, file in task.inputs.items()}
+        contents = [self._content(hashes[place], file) for place, file in task.inputs.items()]
+        options = {"num_cpus": task.threads, "num_gpus": task.gpus, "max_retries": 0, "name": task.name}
+        perform = self._perform.options(**options)
+        reference = perform.remote(installation.version(), pickle.dumps(task), hashes, *contents)
+        self._under_way[reference] = task
+
+    def _content(self, sha256: str, file: Path) -> Any:
+        """A reference to the content of a file, which Ray brings to each node once."""
+        if sha256 not in self._contents:
+            self._contents[sha256] = self._ray.put(file.read_bytes())
+        return self._contents[sha256]
+
+    def _replies(self) -> Iterator[tuple[Task, Reply | None]]:
+        """Waits for tasks that have ended; yields them with their replies, None if the node was lost."""
+        ready, _ = self._ray.wait(list(self._under_way), timeout=PERIOD)
+        for reference in ready:
+            task = self._under_way.pop(reference)
+            yield task, self._reply(task, reference)
+
+    def _reply(self, task: Task, reference: Any) -> Reply | None:
+        """The reply of a task that has ended. Raises OtherVersion and PieceFailed."""
+        errors = self._ray.exceptions
+        try:
+            reply: Reply = self._ray.get(reference)
+        except (errors.NodeDiedError, errors.ObjectLostError) as error:
+            self.losses += 1
+            self._lost[task.name] = self._lost.get(task.name, 0) + 1
+            if self._lost[task.name] >= LOSSES:
+                raise PieceFailed(f"{task.name}: {LOSSES} nodes were lost while they did it") from error
+            return None
+        except errors.WorkerCrashedError as error:
+            raise PieceFailed(f"{task.name}: its process crashed; it is not tried again") from error
+        except errors.RayError as error:
+            raise PieceFailed(f"{task.name}: {' '.join(str(error).split())}") from error
+        if reply.is_refusal:
+            raise OtherVersion(reply.error)
+        if reply.error:
+            raise PieceFailed(f"{task.name}, on node {reply.node}: {reply.error}") from RemoteError(reply.traceback)
+        return reply
+
+
+class RemoteError(Exception):
+    """The traceback of an error on a node, as the cause of the driver's error."""
+
+
+@contextmanager
+def _without_messages() -> Iterator[None]:
+    """Keeps Ray's messages out of the results: it prints about lost nodes on stdout."""
+    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):
+        yield

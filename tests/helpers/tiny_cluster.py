@@ -1,0 +1,62 @@
+"""Ray with several nodes on this machine, and workers that play the tiny benchmark."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dextron_bench.cluster import ray_cluster, worker
+from dextron_bench.cluster.tasks import Reply
+from dextron_bench.experts import outcomes
+from dextron_bench.runs import evaluation_job
+from tests.helpers import tiny_training
+
+Blocks = Iterator[tuple[int, pd.DataFrame]]  # Numbers of blocks, and their draws.
+ROOT = str(Path(__file__).parents[2])
+DATA = "TINY_BENCHMARK"  # Names the folder with its splits.
+
+
+def perform(expected: Mapping[str, str | None], pickled: bytes, places: Mapping[str, str], *contents: bytes) -> Reply:
+    """Does a task on the tiny benchmark."""
+    install(Path(os.environ[DATA]))
+    return worker.perform(expected, pickled, places, *contents)
+
+
+def install(folder: Path, put: Callable[[object, str, object], None] = setattr) -> None:
+    """Installs the tiny benchmark with training, cut into pieces of one row; searches play no simulation."""
+    tiny_training.install(folder, put)
+    put(evaluation_job, "ROWS", 1)
+    put(outcomes, "play_blocks", quick_outcomes)
+
+
+def quick_outcomes(source: object, engine: object, drawn: Blocks, experts: int) -> Blocks:
+    """Outcomes of draws that follow from d_c alone."""
+    for number, draws in drawn:
+        yield number, draws.assign(score=np.where(draws["critical"].between(0.2, 0.3), 20.0, 0.5), length=50)
+
+
+@contextmanager
+def started(folder: Path, monkeypatch: pytest.MonkeyPatch, nodes: int = 1) -> Iterator[Any]:
+    """A cluster whose head has no processors, and nodes with one each; commands reach it by `--cluster auto`."""
+    pytest.importorskip("ray")
+    utils = importlib.import_module("ray.cluster_utils")
+    monkeypatch.setenv(DATA, str(folder))
+    monkeypatch.setenv("PYTHONPATH", ROOT)
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    monkeypatch.setattr(ray_cluster, "PERFORM", perform)
+    cluster = utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
+    try:
+        for _ in range(nodes):
+            cluster.add_node(num_cpus=1)
+        monkeypatch.setenv("RAY_ADDRESS", cluster.address)
+        yield cluster
+    finally:
+        cluster.shutdown()
