@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dextron_bench.cli import shares
+from dextron_bench.cli import clusters, shares
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import progress_bar
 from dextron_bench.leaderboard import build, finding_pieces
@@ -35,6 +35,8 @@ def verify_board(flags: Verify) -> int:
     """Verifies every row, or with --merge takes the findings of shares, and prints them; returns the exit code."""
     sound, pieces = True, _pieces(flags)
     rows = board.rows(flags.board, flags.method, flags.reaches)
+    if flags.cluster:
+        _check_on_cluster(flags, pieces, rows)
     stored = pieces.read(rows)
     if flags.merge:
         shares.check_complete("the merge", [row.run.identity for row in rows], stored)
@@ -56,6 +58,16 @@ def verify_board(flags: Verify) -> int:
     else:
         print("tables and page: equal to those computed again from the results")
     return DONE if sound and not problems else DIFFERS
+
+
+def _check_on_cluster(flags: Verify, pieces: FindingPieces, rows: list[Row]) -> None:
+    from dextron_bench.cluster import verifications
+
+    with (
+        clusters.connected(flags.cluster, flags.runs, flags.threads) as cluster,
+        progress_bar("rows", flags.quiet) as progress,
+    ):
+        verifications.check(cluster, pieces, rows, flags.runs, progress)
 
 
 def _check(flags: Verify, row: Row) -> Finding:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli import shares
+from dextron_bench.cli import clusters, shares
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
@@ -59,6 +59,9 @@ class Verify:
     """With --all: do only a part of the work; 0/2 and 1/2 are its halves (docs/many-machines.md)."""
     merge: bool = False
     """With --all: only put together what shares have done; if anything is missing, this is an error that names it."""
+    cluster: clusters.Flag = ""
+    """With --all: check the rows on a cluster with Ray: on this machine, on the cluster it belongs to, or on another
+    one."""
     runs: Path = Path("runs")
     """Folder of all runs; the findings of shares are in its folder `verify`."""
     threads: int = 0
@@ -70,6 +73,7 @@ class Verify:
         from dextron_bench.cli import board_verification
         from dextron_bench.leaderboard import verify_board
 
+        clusters.check(self.cluster, self.share, self.merge)
         share = shares.parse(self.share, self.merge)
         if self.all and self.bundle is not None:
             raise verify_board.NothingToVerify(
@@ -77,8 +81,10 @@ class Verify:
             )
         if not self.all and self.bundle is None:
             raise verify_board.NothingToVerify("give a submission, or --all for the leaderboard's own rows")
-        if self.bundle is not None and (share is not None or self.merge):
-            raise shares.BadShare("--share and --merge need --all: the verification of a submission is one piece")
+        if self.bundle is not None and (share is not None or self.merge or self.cluster):
+            raise shares.BadShare(
+                "--share, --merge and --cluster need --all: the verification of a submission is one piece"
+            )
         if share is not None:
             return board_verification.verify_share(self, share)
         if self.bundle is None:

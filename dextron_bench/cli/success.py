@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli import shares
+from dextron_bench.cli import clusters, shares
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 from dextron_bench.reaches.sources import RankedSource
+
+if TYPE_CHECKING:
+    from dextron_bench.success.generation import DatasetConfig
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,10 @@ class Data:
     """Weights of the policies that play half of the episodes, in turn; by default experts play all episodes."""
     seed: int = 0
     """Seed of all draws."""
+    cluster: clusters.Flag = ""
+    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
-    """Threads of the simulation; 0 means one per processor."""
+    """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece."""
     runs: Path = Path("runs")
     """Folder of all runs; also holds the data set."""
     share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
@@ -51,8 +56,10 @@ class Data:
         from dextron_bench.storage import hashing
         from dextron_bench.success import generation, sharing
 
+        clusters.check(self.cluster, self.share, self.merge)
         share = shares.parse(self.share, self.merge)
-        agents = {hashing.sha256(file): weights.load_agent_from_file(file) for file in self.policies}
+        files = {hashing.sha256(file): file for file in self.policies}
+        agents = {name: weights.load_agent_from_file(file) for name, file in files.items()}
         config = generation.DatasetConfig(self.reaches, self.seed, tuple(agents))
         source, train = open_source(self.reaches), load_split(self.reaches, "train").cases
         folder = folder_of(self.runs, self.reaches, self.seed)
@@ -64,6 +71,8 @@ class Data:
             return shares.print_done(share, f"{count} blocks", folder)
         if self.merge:
             sharing.check_complete(folder, config, self.rows)
+        if self.cluster:
+            self._play_on_cluster(config, folder, files)
         with progress_bar("transitions", self.quiet) as progress:
             tallies = generation.generate(source, train, config, folder, self.rows, agents, self.threads, progress)
         rows = [{"kind": kind, **tally.as_dict()} for kind, tally in tallies.items() if tally.rows]
@@ -73,6 +82,15 @@ class Data:
         else:
             print_table(f"data set in {folder}", list(rows[0]), [list(row.values()) for row in rows])
         return DONE
+
+    def _play_on_cluster(self, config: DatasetConfig, folder: Path, policies: dict[str, Path]) -> None:
+        from dextron_bench.cluster import datasets
+
+        with (
+            clusters.connected(self.cluster, self.runs, self.threads) as cluster,
+            progress_bar("transitions", self.quiet) as progress,
+        ):
+            datasets.play_blocks(cluster, config, folder, self.runs, self.rows, policies, progress)
 
 
 @dataclass(frozen=True)

@@ -69,13 +69,17 @@ def expected(job: EvaluationJob, piece: RowPiece) -> dict[str, Any]:
 def play_expected(job: EvaluationJob, name: str, wanted: Mapping[str, Any]) -> Sequence[Path]:
     """Plays the piece with a name; returns its files. Raises OtherVersion if it depends on other things than wanted."""
     piece = next(piece for piece in job.pieces() if piece.name == name)
-    here = expected(job, piece)
-    if differing := [key for key in wanted if here.get(key) != wanted[key]]:
-        raise OtherVersion(
-            f"a node has another version of {job.folder.identity}: it differs in {' and '.join(differing)}; install "
-            "the same on all nodes"
-        )
+    check_expected(job.folder.identity, expected(job, piece), wanted)
     return job.play_piece(piece)
+
+
+def check_expected(what: str, here: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    """Raises OtherVersion if something depends on other things on this node than where the command runs."""
+    if differing := [name for name in wanted if here.get(name) != wanted[name]]:
+        raise OtherVersion(
+            f"a node has another version of {what}: it differs in {' and '.join(differing)}; install the same on all "
+            "nodes"
+        )
 
 
 def without_file(plan: plans.Plan) -> tuple[plans.Plan, dict[str, Path]]:

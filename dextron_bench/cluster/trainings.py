@@ -16,7 +16,7 @@ from typing import Any
 from dextron_bench.cluster import evaluations
 from dextron_bench.cluster.inputs import imported_reaches
 from dextron_bench.cluster.ray_cluster import RayCluster
-from dextron_bench.cluster.tasks import RUNS, BadCluster, OtherVersion, Task
+from dextron_bench.cluster.tasks import RUNS, BadCluster, Task
 from dextron_bench.methods import registry
 from dextron_bench.runs import plans
 from dextron_bench.storage import folder_config, provenance
@@ -148,11 +148,7 @@ def train_some(
     job = run.training_job(runs, threads, device)
     assert job is not None
     training, start = Training(run, job, seeds), time.monotonic()
-    if differing := [name for name, value in _expected(training).items() if expected[name] != value]:
-        raise OtherVersion(
-            f"a node has another version of {job.learner.label}: it differs in {' and '.join(differing)}; install the "
-            "same on all nodes"
-        )
+    evaluations.check_expected(job.learner.label, _expected(training), expected)
 
     def watch(_: object) -> None:
         if time.monotonic() - start > seconds:

@@ -25,18 +25,18 @@ class FindingPieces:
     board: Path
     flags: dict[str, Any]
 
-    def write(self, row: Row, finding: Finding) -> None:
-        """Writes the finding of a row."""
+    def write(self, row: Row, finding: Finding) -> list[Path]:
+        """Writes the finding of a row; returns its files, the stamp last."""
         name = _name(row)
         file = self._work.file(name, FILE)
         atomic.write_json(file, asdict(finding))
-        self._work.write(name, self._config(row), [file])
+        return [file, self._work.write(name, self.config_of(row), [file])]
 
     def read(self, rows: Sequence[Row]) -> dict[str, shares.Piece]:
         """The pieces that are there, by the identity of the row's run; raises the errors of `shares.Work.read`."""
         if not self._work.is_begun:
             return {}
-        configs = {_name(row): self._config(row) for row in rows}
+        configs = {_name(row): self.config_of(row) for row in rows}
         pieces = self._work.read(configs.get)
         return {row.run.identity: pieces[_name(row)] for row in rows if _name(row) in pieces}
 
@@ -48,7 +48,7 @@ class FindingPieces:
     def _work(self) -> shares.Work:
         return shares.Work(self.folder, provenance.code_hash())
 
-    def _config(self, row: Row) -> dict[str, Any]:
+    def config_of(self, row: Row) -> dict[str, Any]:
         """What a finding depends on: the published files of the row, the code of its method, and the flags."""
         fresh = [self.board / fresh_baselines.FOLDER / f"{row.result['reaches']}{end}" for end in (".json", ".parquet")]
         files = {file.name: file for file in (row.run.result, row.run.episodes, row.run.fresh, *fresh) if file.exists()}

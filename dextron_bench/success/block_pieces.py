@@ -24,9 +24,9 @@ def file_of(folder: Path, number: int) -> Path:
     return work(folder).file(f"{number:06d}", SUFFIX)
 
 
-def write_stamp(folder: Path, config: Mapping[str, Any], number: int) -> None:
+def write_stamp(folder: Path, config: Mapping[str, Any], number: int) -> Path:
     """Completes the piece of a block whose file is written; `config` is what the data set depends on."""
-    work(folder).write(f"{number:06d}", config, [file_of(folder, number)])
+    return work(folder).write(f"{number:06d}", config, [file_of(folder, number)])
 
 
 def read(folder: Path, config: Mapping[str, Any]) -> dict[int, shares.Piece]:

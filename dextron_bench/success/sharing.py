@@ -55,9 +55,7 @@ def generate_share(
 def check_complete(folder: Path, config: DatasetConfig, rows: int) -> None:
     """Raises MissingPieces if blocks are missing for `rows` transitions, and the errors of `shares.Work.read`."""
     block_pieces.read(folder, generation.write_or_check_config(folder, config, rows))
-    sizes, total, number = block_pieces.block_sizes(folder), 0, 0
-    while total < rows and number in sizes:
-        total, number = total + sizes[number], number + 1
+    sizes, total = block_pieces.block_sizes(folder), transitions(folder)
     if total < rows:
         names = [f"block {number:06d}" for number in range(max(sizes, default=-1) + 1)]
         shares.check_complete(f"the data set in {folder}", names, {f"block {number:06d}" for number in sizes})
@@ -65,3 +63,9 @@ def check_complete(folder: Path, config: DatasetConfig, rows: int) -> None:
             f"the data set in {folder} lacks the blocks from {len(names):06d} on: the blocks before have {total} of "
             f"{rows} transitions; run the shares again, or leave out --merge"
         )
+
+
+def transitions(folder: Path) -> int:
+    """The number of transitions in the blocks and pieces of a data set, up to the first block that is missing."""
+    sizes = block_pieces.block_sizes(folder)
+    return sum(sizes[number] for number in itertools.takewhile(sizes.__contains__, itertools.count()))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from dextron_bench.cli import main
+from dextron_bench.cluster import trainings
 from dextron_bench.experts import montecarlo
 from tests.cli.test_shares import contents
 from tests.helpers import tiny_benchmark, tiny_cluster, tiny_training
+from tests.helpers.tiny_runs import constant_agent
+from tests.helpers.tiny_training import TOY
 
 pytestmark = pytest.mark.slow
 RUN = ("run", "--method", "exp", "--no-floors", "--quiet", "--threads", "1")
@@ -45,3 +49,59 @@ def test_the_bytes_are_the_same_without_a_cluster_and_on_one_and_two_nodes(
             assert more == files
             assert capsys.readouterr().out == printed.replace("whole", runs)
             cluster.add_node(num_cpus=1)
+
+
+def test_a_training_goes_on_where_a_task_or_a_lost_node_left_it(here: Path, monkeypatch: pytest.MonkeyPatch):
+    """A task ends at each checkpoint, after epochs 2, 4 and 5. The second one loses its node."""
+    words = ("run", "--method", TOY, "--preset", "quick", "--no-floors", "--quiet", "--threads", "1", "--split", "val")
+    play(*words, "--seed", "0", "3", "--runs", "whole")
+    monkeypatch.setattr(trainings, "SECONDS", 0.0)
+    with (
+        tiny_cluster.started(here / "data", monkeypatch, nodes=2) as cluster,
+        tiny_cluster.losing_a_node(cluster, here, "training", nth=2) as lost,
+    ):
+        play(*words, "--seed", "0", "3", "--cluster", "auto")
+    assert lost == [True]
+    assert tiny_training.contents(here / "runs") == tiny_training.contents(here / "whole")
+
+
+def test_pieces_of_a_lost_node_are_played_again(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    play(*RUN, "--runs", "whole")
+    with (
+        tiny_cluster.started(here / "data", monkeypatch, nodes=2) as cluster,
+        tiny_cluster.losing_a_node(cluster, here, "test-0001-0001") as lost,
+    ):
+        play(*RUN, "--cluster", "auto")
+    assert lost == [True]
+    assert contents(here / "runs") == contents(here / "whole")
+    assert "1 pieces were done again, because their node was lost" in capsys.readouterr().err
+
+
+def test_an_agent_that_crashes_its_process_is_not_tried_again(
+    here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]
+):
+    agent = constant_agent(here, f"(open({str(here / 'tries')!r}, 'a').write('x'), __import__('os')._exit(3))")
+    with tiny_cluster.started(here / "data", monkeypatch):
+        words = ("run", "--method", agent, "--split", "test", "--no-floors", "--quiet", "--cluster", "auto")
+        text = complaint(*words)
+        assert "constant/synthetic/seed0/test-0000-0001: its process crashed; it is not tried again" in text
+        assert (here / "tries").read_text() == "x"
+        constant_agent(here, "1 / 0")
+        assert "failed" in complaint(*words)
+
+
+def test_a_worker_of_another_version_is_refused(
+    here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]
+):
+    other = here / "other"
+    for name in ("dextron_bench", "baselines", "tests"):
+        shutil.copytree(Path(tiny_cluster.ROOT) / name, other / name, ignore=shutil.ignore_patterns("__pycache__"))
+    with (other / "dextron_bench/experts/policies.py").open("a") as file:
+        file.write("# Another version.\n")
+    with tiny_cluster.started(here / "data", monkeypatch, nodes=0) as cluster:
+        cluster.add_node(num_cpus=1, env_vars={"PYTHONPATH": str(other)})
+        text = complaint(*RUN, "--cluster", "auto")
+    assert "has another version than this machine: it differs in code; install the same on all nodes" in text
+    assert not list(here.glob("runs/**/*.parquet"))

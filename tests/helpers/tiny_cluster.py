@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
+import pickle
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,9 +18,10 @@ import pandas as pd
 import pytest
 
 from dextron_bench.cluster import ray_cluster, worker
-from dextron_bench.cluster.tasks import Reply
+from dextron_bench.cluster.tasks import Reply, Task
 from dextron_bench.experts import outcomes
 from dextron_bench.runs import evaluation_job
+from dextron_bench.storage import atomic
 from tests.helpers import tiny_training
 
 Blocks = Iterator[tuple[int, pd.DataFrame]]  # Numbers of blocks, and their draws.
@@ -27,6 +32,7 @@ DATA = "TINY_BENCHMARK"  # Names the folder with its splits.
 def perform(expected: Mapping[str, str | None], pickled: bytes, places: Mapping[str, str], *contents: bytes) -> Reply:
     """Does a task on the tiny benchmark."""
     install(Path(os.environ[DATA]))
+    _wait_to_be_killed(pickle.loads(pickled))
     return worker.perform(expected, pickled, places, *contents)
 
 
@@ -60,3 +66,43 @@ def started(folder: Path, monkeypatch: pytest.MonkeyPatch, nodes: int = 1) -> It
         yield cluster
     finally:
         cluster.shutdown()
+
+
+@contextmanager
+def losing_a_node(cluster: Any, folder: Path, name: str, nth: int = 1) -> Iterator[list[bool]]:
+    """Kills the node that gets the nth task whose name contains a text, while the task waits on it.
+
+    Yields a list that has one entry when the node is killed.
+    """
+    folder = folder / "lost"
+    folder.mkdir()
+    (folder / "task.json").write_text(json.dumps({"name": name, "nth": nth}))
+    lost: list[bool] = []
+
+    def kill() -> None:
+        while not (file := folder / "node").exists():
+            time.sleep(0.1)
+        identity = file.read_text()
+        cluster.remove_node(next(one for one in cluster.list_all_nodes() if one.node_id == identity), False)
+        lost.append(True)
+
+    thread = threading.Thread(target=kill, daemon=True)
+    thread.start()
+    yield lost
+    thread.join(timeout=1.0)
+
+
+def _wait_to_be_killed(task: Task) -> None:
+    """Waits if this is the task that shall lose its node, at its first try."""
+    folder = Path(os.environ[DATA]).parent / "lost"
+    if not folder.exists() or (folder / "node").exists():
+        return
+    wanted = json.loads((folder / "task.json").read_text())
+    if wanted["name"] not in task.name:
+        return
+    with (folder / "tries").open("a") as file:
+        file.write("x")
+    if len((folder / "tries").read_text()) == wanted["nth"]:
+        ray = importlib.import_module("ray")
+        atomic.write_atomically(folder / "node", lambda part: part.write_text(ray.get_runtime_context().get_node_id()))
+        time.sleep(600.0)
