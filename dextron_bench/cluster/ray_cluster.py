@@ -20,15 +20,18 @@ from dextron_bench.storage.progress import Progress, no_progress
 
 LOCAL, AUTO, REMOTE = "local", "auto", "ray://"
 START = "start one with `ray start --head`, or use --cluster local"
+SETTINGS = {  # Of Ray, unless the user sets others.
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+    "RAY_raylet_start_wait_time_s": "300",  # A busy machine starts slowly.
+}
 WAITING = 2.0  # Tasks in the cluster for each that can run, so that no processor waits for the driver.
 PERIOD = 1.0  # [s] at most until nodes that have joined get tasks.
 LOSSES = 5  # A piece that has lost so many nodes is given up.
 PERFORM = worker.perform  # What every task calls on its node.
 
 Next = Callable[[int], Task | None]  # Receives how many tasks are under way.
-Done = Callable[
-    [Task], bool
-]  # Receives a task whose files are written; True ends the work, and the others are cancelled.
+Done = Callable[[Task], bool]  # Receives a task whose files are written; if True, the work is done.
 
 
 def check_flag(text: str) -> None:
@@ -55,8 +58,8 @@ class RayCluster:
         self._lost: dict[str, int] = {}  # By name of the task: how many nodes it has lost.
 
     def __enter__(self) -> RayCluster:
-        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-        os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+        for name, value in SETTINGS.items():
+            os.environ.setdefault(name, value)
         self._ray = importlib.import_module("ray")
         with _without_messages():
             self._connect()
@@ -121,12 +124,8 @@ class RayCluster:
             else:
                 self._ray.init(self._address, **quiet)
         except ConnectionError as error:
-            remedy = (
-                "start one with `ray start --head`, or use --cluster local" if self._address == AUTO else str(error)
-            )
-            raise BadCluster(
-                f"no Ray cluster answers at --cluster {self._address}: {' '.join(remedy.split())}"
-            ) from error
+            why = START if self._address == AUTO else " ".join(str(error).split())
+            raise BadCluster(f"no cluster answers to --cluster {self._address}: {why}") from error
 
     def _room(self) -> int:
         """How many tasks to have in the cluster at once; raises BadCluster if no node has the processors of a task."""

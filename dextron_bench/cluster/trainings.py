@@ -140,7 +140,7 @@ def train_some(
     expected: Mapping[str, Any],
     seconds: float,
 ) -> Sequence[Path]:
-    """Trains until the first checkpoint after some seconds, or to the end; returns all files of the training.
+    """Trains until the first new checkpoint after some seconds, or to the end; returns all files of the training.
 
     Raises OtherVersion if the method differs from what is expected, and the errors of `TrainingJob.run`.
     """
@@ -148,10 +148,11 @@ def train_some(
     job = run.training_job(runs, threads, device)
     assert job is not None
     training, start = Training(run, job, seeds), time.monotonic()
+    first = training.epoch
     evaluations.check_expected(job.learner.label, _expected(training), expected)
 
     def watch(_: object) -> None:
-        if time.monotonic() - start > seconds:
+        if training.epoch > first and time.monotonic() - start > seconds:
             raise loop.StoppedEarly
 
     with suppress(loop.StoppedEarly):

@@ -89,7 +89,7 @@ def test_an_agent_that_crashes_its_process_is_not_tried_again(
         assert "constant/synthetic/seed0/test-0000-0001: its process crashed; it is not tried again" in text
         assert (here / "tries").read_text() == "x"
         constant_agent(here, "1 / 0")
-        assert "failed" in complaint(*words)
+        assert "the agent's act() raised ZeroDivisionError: division by zero" in complaint(*words)
 
 
 def test_a_worker_of_another_version_is_refused(

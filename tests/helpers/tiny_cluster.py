@@ -52,11 +52,12 @@ def quick_outcomes(source: object, engine: object, drawn: Blocks, experts: int) 
 @contextmanager
 def started(folder: Path, monkeypatch: pytest.MonkeyPatch, nodes: int = 1) -> Iterator[Any]:
     """A cluster whose head has no processors, and nodes with one each; commands reach it by `--cluster auto`."""
+    for name, value in ray_cluster.SETTINGS.items():
+        os.environ.setdefault(name, value)  # Ray reads them when it is imported.
     pytest.importorskip("ray")
     utils = importlib.import_module("ray.cluster_utils")
     monkeypatch.setenv(DATA, str(folder))
     monkeypatch.setenv("PYTHONPATH", ROOT)
-    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
     monkeypatch.setattr(ray_cluster, "PERFORM", perform)
     cluster = utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
     try:
