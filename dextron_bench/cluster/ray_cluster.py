@@ -24,6 +24,7 @@ SETTINGS = {  # Of Ray, unless the user sets others.
     "RAY_USAGE_STATS_ENABLED": "0",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     "RAY_raylet_start_wait_time_s": "300",  # A busy machine starts slowly.
+    "RAY_agent_register_timeout_ms": "300000",
 }
 WAITING = 2.0  # Tasks in the cluster for each that can run, so that no processor waits for the driver.
 PERIOD = 1.0  # [s] at most until nodes that have joined get tasks.
@@ -88,9 +89,7 @@ class RayCluster:
                         if done(task):
                             return
             finally:
-                for reference in self._under_way:
-                    self._ray.cancel(reference)
-                self._under_way.clear()
+                self._cancel()
 
     def run_all(self, tasks: Sequence[Task], progress: Progress = no_progress) -> None:
         """Does tasks; `progress` receives how many are done. Raises the errors of `run`."""
@@ -137,6 +136,12 @@ class RayCluster:
             )
         return max(1, int(WAITING * sum(number // self.threads for number in processors)))
 
+    def _cancel(self) -> None:
+        """Cancels the tasks under way."""
+        for reference in self._under_way:
+            self._ray.cancel(reference)
+        self._under_way.clear()
+
     def _submit(self, task: Task) -> None:
         """Sends a task to the cluster. Ray itself never tries again: only the driver knows why a task ended."""
         hashes = {place: hashing.sha256(file) for place, file in task.inputs.items()}
@@ -174,6 +179,10 @@ class RayCluster:
             raise PieceFailed(f"{task.name}: its process crashed; it is not tried again") from error
         except errors.RayError as error:
             raise PieceFailed(f"{task.name}: {' '.join(str(error).split())}") from error
+        return self._checked(task, reply)
+
+    def _checked(self, task: Task, reply: Reply) -> Reply:
+        """The reply, if it has files. Raises OtherVersion and PieceFailed."""
         if reply.is_refusal:
             raise OtherVersion(reply.error)
         if reply.error:

@@ -9,12 +9,10 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.cluster import trainings
 from dextron_bench.experts import montecarlo
 from tests.cli.test_shares import contents
 from tests.helpers import tiny_benchmark, tiny_cluster, tiny_training
 from tests.helpers.tiny_runs import constant_agent
-from tests.helpers.tiny_training import TOY
 
 pytestmark = pytest.mark.slow
 RUN = ("run", "--method", "exp", "--no-floors", "--quiet", "--threads", "1")
@@ -49,20 +47,6 @@ def test_the_bytes_are_the_same_without_a_cluster_and_on_one_and_two_nodes(
             assert more == files
             assert capsys.readouterr().out == printed.replace("whole", runs)
             cluster.add_node(num_cpus=1)
-
-
-def test_a_training_goes_on_where_a_task_or_a_lost_node_left_it(here: Path, monkeypatch: pytest.MonkeyPatch):
-    """A task ends at each checkpoint, after epochs 2, 4 and 5. The second one loses its node."""
-    words = ("run", "--method", TOY, "--preset", "quick", "--no-floors", "--quiet", "--threads", "1", "--split", "val")
-    play(*words, "--seed", "0", "3", "--runs", "whole")
-    monkeypatch.setattr(trainings, "SECONDS", 0.0)
-    with (
-        tiny_cluster.started(here / "data", monkeypatch, nodes=2) as cluster,
-        tiny_cluster.losing_a_node(cluster, here, "training", nth=2) as lost,
-    ):
-        play(*words, "--seed", "0", "3", "--cluster", "auto")
-    assert lost == [True]
-    assert tiny_training.contents(here / "runs") == tiny_training.contents(here / "whole")
 
 
 def test_pieces_of_a_lost_node_are_played_again(

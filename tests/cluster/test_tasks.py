@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,9 @@ import pytest
 
 from dextron_bench.cli import main
 from dextron_bench.cluster import installation, ray_cluster, worker
-from dextron_bench.cluster.tasks import BadCluster, Reply, ResultFile, Task, content_hash, write_files
+from dextron_bench.cluster.tasks import BadCluster, ResultFile, Task, content_hash, write_files
 from dextron_bench.storage import atomic
+from tests.helpers.immediate_cluster import ImmediateCluster, performed
 
 
 def double(runs: Path, threads: int, name: str) -> Sequence[Path]:
@@ -43,13 +43,6 @@ def own_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(worker.tempfile, "tempdir", str(tmp_path / "node"))
     for name in (*worker.THREAD_VARIABLES, "OPENBLAS_NUM_THREADS"):
         monkeypatch.setenv(name, "1")
-
-
-def performed(task: Task, version: dict[str, str | None] | None = None) -> Reply:
-    """What a node answers to a task, without a cluster."""
-    contents = {place: file.read_bytes() for place, file in task.inputs.items()}
-    hashes = {place: content_hash(content) for place, content in contents.items()}
-    return worker.perform(version or installation.version(), pickle.dumps(task), hashes, *contents.values())
 
 
 def test_inputs_arrive_once_and_only_new_files_come_back(tmp_path: Path):
@@ -111,28 +104,9 @@ def test_without_ray_the_flag_says_what_to_install(complaint: Callable[..., str]
         assert text == "dextron-bench: --cluster needs Ray: `pip install 'dextron-bench[cluster]'`\n"
 
 
-class ImmediateCluster(ray_cluster.RayCluster):
-    """Does tasks in this process; the tasks whose names are in `losing` lose their node so often."""
-
-    def __init__(self, runs: Path, losing: dict[str, int], room: int = 2) -> None:
-        self._runs, self._under_way, self._losing, self._count = runs, {}, losing, room
-        self.threads, self.order = 1, list[str]()
-
-    def _room(self) -> int:
-        return self._count
-
-    def _submit(self, task: Task) -> None:
-        self._under_way[task.name] = task
-
-    def _replies(self) -> Any:
-        task = self._under_way.pop(next(iter(self._under_way)))
-        self.order.append(task.name)
-        self._losing[task.name] = self._losing.get(task.name, 0) - 1
-        yield task, None if self._losing[task.name] >= 0 else performed(task)
-
-
 def test_a_piece_of_a_lost_node_is_done_before_new_ones(tmp_path: Path):
-    cluster = ImmediateCluster(tmp_path / "runs", {"b": 2})
+    cluster = ImmediateCluster("local", tmp_path / "runs")
+    cluster.losing = {"b": 2}
     counts: list[tuple[int, int]] = []
     tasks = [Task(name, threads_of_libraries, {}) for name in "abcd"]
     cluster.run_all(tasks, lambda done, total, note="": counts.append((done, total)))
