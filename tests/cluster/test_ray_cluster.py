@@ -1,8 +1,7 @@
-"""Commands on a real Ray with several nodes: the same bytes, lost nodes, other versions, failures of the work."""
+"""Commands on a real Ray with several nodes: the same bytes, lost nodes, failures of the work."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -74,18 +73,3 @@ def test_an_agent_that_crashes_its_process_is_not_tried_again(
         assert (here / "tries").read_text() == "x"
         constant_agent(here, "1 / 0")
         assert "the agent's act() raised ZeroDivisionError: division by zero" in complaint(*words)
-
-
-def test_a_worker_of_another_version_is_refused(
-    here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]
-):
-    other = here / "other"
-    for name in ("dextron_bench", "baselines", "tests"):
-        shutil.copytree(Path(tiny_cluster.ROOT) / name, other / name, ignore=shutil.ignore_patterns("__pycache__"))
-    with (other / "dextron_bench/experts/policies.py").open("a") as file:
-        file.write("# Another version.\n")
-    with tiny_cluster.started(here / "data", monkeypatch, nodes=0) as cluster:
-        cluster.add_node(num_cpus=1, env_vars={"PYTHONPATH": str(other)})
-        text = complaint(*RUN, "--cluster", "auto")
-    assert "has another version than this machine: it differs in code; install the same on all nodes" in text
-    assert not list(here.glob("runs/**/*.parquet"))
