@@ -123,7 +123,7 @@ def test_a_large_task_fits_no_small_node(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(ray_cluster.importlib.util, "find_spec", lambda name: object())
     for threads, room in ((1, 4), (2, 2)):
         cluster = ray_cluster.RayCluster("local", tmp_path, threads)
-        cluster._ray = Ray
+        monkeypatch.setattr(cluster, "_ray", Ray, raising=False)
         assert cluster._room() == room
     cluster.threads = 4
     with pytest.raises(BadCluster, match="a task needs 4 processors, and the largest node has 2"):
