@@ -19,6 +19,7 @@ from dextron_bench.storage import hashing
 from dextron_bench.storage.progress import Progress, no_progress
 
 LOCAL, AUTO, REMOTE = "local", "auto", "ray://"
+TOKEN = Path("~/.ray/auth_token")  # Ray's, which a cluster with authentication asks for.
 START = "start one with `ray start --head`, or use --cluster local"
 SETTINGS = {  # Of Ray, unless the user sets others.
     "RAY_USAGE_STATS_ENABLED": "0",
@@ -61,6 +62,8 @@ class RayCluster:
     def __enter__(self) -> RayCluster:
         for name, value in SETTINGS.items():
             os.environ.setdefault(name, value)
+        if self._address.startswith(REMOTE) and TOKEN.expanduser().exists():
+            os.environ.setdefault("RAY_AUTH_MODE", "token")  # Only nodes of a cluster find out by themselves.
         self._ray = importlib.import_module("ray")
         with _without_messages():
             self._connect()

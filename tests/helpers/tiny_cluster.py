@@ -8,7 +8,7 @@ import os
 import pickle
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,15 @@ def install(folder: Path, put: Callable[[object, str, object], None] = setattr) 
     put(outcomes, "play_blocks", quick_outcomes)
 
 
+def measure(runs: Path, threads: int, place: str) -> Sequence[Path]:
+    """Writes the length of an input into a file whose name is the input's first byte."""
+    content = (runs / place).read_bytes()
+    file = runs / "sizes" / str(content[0])
+    file.parent.mkdir()
+    file.write_text(str(len(content)))
+    return [file]
+
+
 def quick_outcomes(source: object, engine: object, drawn: Blocks, experts: int) -> Blocks:
     """Outcomes of draws that follow from d_c alone."""
     for number, draws in drawn:
@@ -50,8 +59,11 @@ def quick_outcomes(source: object, engine: object, drawn: Blocks, experts: int) 
 
 
 @contextmanager
-def started(folder: Path, monkeypatch: pytest.MonkeyPatch, nodes: int = 1) -> Iterator[Any]:
-    """A cluster whose head has no processors, and nodes with one each; commands reach it by `--cluster auto`."""
+def started(folder: Path, monkeypatch: pytest.MonkeyPatch, nodes: int = 1, memory: int | None = None) -> Iterator[Any]:
+    """A cluster whose head has no processors, and nodes with one each; commands reach it by `--cluster auto`.
+
+    `memory` is the size of the object store of the head and of each node [bytes].
+    """
     for name, value in ray_cluster.SETTINGS.items():
         os.environ.setdefault(name, value)  # Ray reads them when it is imported.
     pytest.importorskip("ray")
@@ -59,10 +71,12 @@ def started(folder: Path, monkeypatch: pytest.MonkeyPatch, nodes: int = 1) -> It
     monkeypatch.setenv(DATA, str(folder))
     monkeypatch.setenv("PYTHONPATH", ROOT)
     monkeypatch.setattr(ray_cluster, "PERFORM", perform)
-    cluster = utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
+    stored = {"object_store_memory": memory} if memory else {}
+    head = {"num_cpus": 0, "include_dashboard": False, **stored}
+    cluster = utils.Cluster(initialize_head=True, head_node_args=head)
     try:
         for _ in range(nodes):
-            cluster.add_node(num_cpus=1)
+            cluster.add_node(num_cpus=1, **stored)
         monkeypatch.setenv("RAY_ADDRESS", cluster.address)
         yield cluster
     finally:
