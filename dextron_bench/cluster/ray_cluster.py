@@ -13,9 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from dextron_bench.cluster import installation, worker
+from dextron_bench.cluster import inputs, installation, worker
 from dextron_bench.cluster.tasks import BadCluster, OtherVersion, PieceFailed, Reply, Task, write_files
-from dextron_bench.storage import hashing
 from dextron_bench.storage.progress import Progress, no_progress
 
 LOCAL, AUTO, REMOTE = "local", "auto", "ray://"
@@ -55,7 +54,6 @@ class RayCluster:
         self.threads = threads or 1  # Of a task: one uses the processors best.
         self.losses = 0
         self._address, self._runs = address, runs
-        self._contents: dict[str, Any] = {}  # References to the contents of inputs, by SHA-256.
         self._under_way: dict[Any, Task] = {}
         self._lost: dict[str, int] = {}  # By name of the task: how many nodes it has lost.
 
@@ -68,6 +66,7 @@ class RayCluster:
         with _without_messages():
             self._connect()
         self._perform = self._ray.remote(PERFORM)
+        self._inputs = inputs.References(self._ray.put)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
@@ -147,18 +146,12 @@ class RayCluster:
 
     def _submit(self, task: Task) -> None:
         """Sends a task to the cluster. Ray itself never tries again: only the driver knows why a task ended."""
-        hashes = {place: hashing.sha256(file) for place, file in task.inputs.items()}
-        contents = [self._content(hashes[place], file) for place, file in task.inputs.items()]
+        hashes = {place: self._inputs.sha256(file) for place, file in task.inputs.items()}
+        contents = [self._inputs.reference(file) for file in task.inputs.values()]
         options = {"num_cpus": task.threads, "num_gpus": task.gpus, "max_retries": 0, "name": task.name}
         perform = self._perform.options(**options)
         reference = perform.remote(installation.version(), pickle.dumps(task), hashes, *contents)
         self._under_way[reference] = task
-
-    def _content(self, sha256: str, file: Path) -> Any:
-        """A reference to the content of a file, which Ray brings to each node once."""
-        if sha256 not in self._contents:
-            self._contents[sha256] = self._ray.put(file.read_bytes())
-        return self._contents[sha256]
 
     def _replies(self) -> Iterator[tuple[Task, Reply | None]]:
         """Waits for tasks that have ended; yields them with their replies, None if the node was lost."""

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.cluster import installation, ray_cluster, worker
+from dextron_bench.cluster import inputs, installation, ray_cluster, worker
 from dextron_bench.cluster.tasks import BadCluster, ResultFile, Task, content_hash, write_files
 from dextron_bench.storage import atomic
 from tests.helpers.immediate_cluster import ImmediateCluster, performed
@@ -112,6 +112,23 @@ def test_a_piece_of_a_lost_node_is_done_before_new_ones(tmp_path: Path):
     cluster.run_all(tasks, lambda done, total, note="": counts.append((done, total)))
     assert cluster.order == ["a", "b", "c", "b", "d", "b"]
     assert counts == [(0, 4), (1, 4), (2, 4), (3, 4), (4, 4)]
+
+
+def test_a_content_is_stored_once_until_others_crowd_it_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(inputs, "KEPT", 2)
+    stored: list[bytes] = []
+    references = inputs.References(lambda content: stored.append(content) or f"reference {len(stored)}")
+    for name, content in (("a", "A"), ("same", "A"), ("b", "B")):
+        (tmp_path / name).write_text(content)
+    assert [references.reference(tmp_path / name) for name in ("a", "same", "b", "a")] == [
+        *("reference 1", "reference 1", "reference 2", "reference 1")
+    ]
+    (tmp_path / "b").write_text("longer")
+    assert references.sha256(tmp_path / "b") == content_hash(b"longer")
+    assert references.reference(tmp_path / "b") == "reference 3"
+    (tmp_path / "b").write_text("B")
+    assert references.reference(tmp_path / "b") == "reference 4"
+    assert stored == [b"A", b"B", b"longer", b"B"]
 
 
 def test_a_large_task_fits_no_small_node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
