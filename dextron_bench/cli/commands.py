@@ -25,6 +25,7 @@ from dextron_bench.cli import (
     recordings_choose,
     run,
     runs,
+    runs_compare,
     runs_edit,
     splits,
     submit,
@@ -75,7 +76,7 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "runs": (
         "Runs: list, show and compare them, find the best, mark them, put them away, export them.",
         {
-            **{"list": runs.List, "show": runs.Show, "compare": runs.Compare, "best": runs.Best},
+            **{"list": runs.List, "show": runs.Show, "compare": runs_compare.Compare, "best": runs.Best},
             **{"tag": runs_edit.Tag, "note": runs_edit.Note, "archive": runs_edit.Archive, "rm": runs_edit.Remove},
             "export": runs_edit.Export,
         },

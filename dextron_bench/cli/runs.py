@@ -1,10 +1,9 @@
-"""`dextron-bench runs list, show, compare, best`: finds runs and shows what they have scored."""
+"""`dextron-bench runs list, show, best`: finds runs and shows what they have scored."""
 
 from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -71,7 +70,7 @@ class List:
             print_json(rows)
         elif self.csv:
             writer = csv.writer(sys.stdout, lineterminator="\n")
-            writer.writerows([self.columns, *([_plain(row[name]) for name in self.columns] for row in rows)])
+            writer.writerows([self.columns, *([plain(row[name]) for name in self.columns] for row in rows)])
         else:
             cells = [[_shown(row[name], name) for name in self.columns] for row in rows]
             print_table(f"runs in {self.runs}, scores on {self.split}", self.columns, cells)
@@ -97,7 +96,7 @@ class Show:
 
         entry = catalogue.find(catalogue.entries(self.runs), self.run)
         about = {name: _cell(entry, name, "test") for name in ("run", "state", "date", "tags", "note", "physics")}
-        about |= {"folder": str(entry.folder), "seeds": list(entry.seeds), "code": _code(entry)}
+        about |= {"folder": str(entry.folder), "seeds": list(entry.seeds), "code": code_of(entry)}
         about["settings"] = dict(entry.settings)
         splits = [
             {"split": name, "seeds": len(scores), "rows": scores.shape[1]}
@@ -107,47 +106,9 @@ class Show:
         if self.json:
             print_json(about | {"splits": splits})
             return DONE
-        print_table(entry.name, ["", ""], [[name, _plain(value)] for name, value in about.items() if name != "run"])
+        print_table(entry.name, ["", ""], [[name, plain(value)] for name, value in about.items() if name != "run"])
         columns = ["split", "seeds", "rows", "return", "success"]
         print_table("scores", columns, [[_shown(row[name], name) for name in columns] for row in splits])
-        return DONE
-
-
-@dataclass(frozen=True)
-class Compare:
-    """Compare runs: the settings that differ, the scores with intervals, and the learning curves in one picture.
-
-    `dextron-bench compare` tests two methods on equal settings.
-
-    Example: dextron-bench runs compare rl-hold40/real rlil-0.1/real --into curves.png
-    """
-
-    run: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
-    """The runs, by label, or by label and source of reaches."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
-    into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
-    """Draw the learning curves into this file."""
-    json: bool = False
-    """Print JSON."""
-
-    def __call__(self) -> int:
-        from dextron_bench.runs import catalogue, search
-
-        known = catalogue.entries(self.runs)
-        entries = [catalogue.find(known, name) for name in self.run]
-        names = search.differing_settings(entries)
-        settings = {entry.name: {name: _setting(entry, name) for name in names} for entry in entries}
-        scores = _scores(entries)
-        if self.json:
-            print_json({"settings": settings, "scores": scores})
-        else:
-            rows = [[name, *(_plain(settings[entry.name][name]) for entry in entries)] for name in names]
-            print_table("settings that differ", ["", *(entry.name for entry in entries)], rows)
-            cells = [[_plain(value) for value in row.values()] for row in scores]
-            print_table("scores", list(scores[0]) if scores else ["split"], cells)
-        if self.into is not None:
-            _draw(entries, self.into)
         return DONE
 
 
@@ -200,16 +161,12 @@ def _cell(entry: Entry, name: str, split: str) -> Any:
     return values[name]
 
 
-def _setting(entry: Entry, name: str) -> Any:
-    return {"code": _code(entry), "physics": entry.physics, **entry.settings}.get(name)
-
-
-def _code(entry: Entry) -> str:
+def code_of(entry: Entry) -> str:
     """The class of a run's method, and the first digits of the hash of its file if it is in a file."""
     return " ".join(filter(None, (entry.code.get("class"), (entry.code.get("sha256") or "")[:8])))
 
 
-def _plain(value: Any) -> str:
+def plain(value: Any) -> str:
     """A value as text for a table or CSV; nothing for None."""
     if value is None:
         return ""
@@ -220,32 +177,4 @@ def _shown(value: Any, name: str) -> str:
     """A value as a person reads it: scores rounded, success as a percentage."""
     if name == "success" and value is not None:
         return f"{100 * value:.1f} %"
-    return f"{value:.2f}" if isinstance(value, float) else _plain(value)
-
-
-def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
-    """A row for each split, with each run's mean return and its interval."""
-    from dextron_bench.scores import statistics
-
-    rows = []
-    for split in dict.fromkeys(split for entry in entries for split in entry.scores):
-        row = {"split": split}
-        for entry in entries:
-            if split in entry.scores:
-                score = statistics.estimate(entry.scores[split])
-                row[entry.name] = f"{score.mean:.2f} [{score.low:.2f}, {score.high:.2f}]"
-        rows.append({"split": split, **{entry.name: row.get(entry.name) for entry in entries}})
-    return rows
-
-
-def _draw(entries: Sequence[Entry], file: Path) -> None:
-    import pandas as pd
-
-    from dextron_bench.scores.figures.training import learning_curves
-
-    curves = {
-        entry.name: {seed: pd.DataFrame(points) for seed, points in entry.curves.items()}
-        for entry in entries
-        if entry.curves
-    }
-    learning_curves(curves, pd.DataFrame(columns=["split", "method", "return"]), file)
+    return f"{value:.2f}" if isinstance(value, float) else plain(value)
