@@ -17,8 +17,8 @@ NODES = 10, 100, 1000
 def test_limits_by_hand():
     """1,000 pieces of 10 s on 2 x 5 processors take 1,000 s; with losses (5 + 95) / 1,000 more."""
     cluster = Cluster(2, 5, driver=0.5, bandwidth=1e6, lifetime=1000.0, away=95.0)
-    found = limits(Work(1000, 10.0, 2e6), cluster)
-    assert found == pytest.approx({"processors": 1100.0, "driver": 500.0, "network": 2000.0})
+    times = limits(Work(1000, 10.0, 2e6), cluster)
+    assert times == pytest.approx({"processors": 1100.0, "driver": 500.0, "network": 2000.0})
     assert expected(Work(1000, 10.0, 2e6), cluster) == pytest.approx((2010.0, "network"))
 
 
