@@ -17,9 +17,10 @@ from dextron_bench.methods.learners import Track
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic, tensors
+from dextron_bench.storage import tensors
 from dextron_bench.sweeps import cross_validation
 from tests.helpers import tiny_benchmark, tiny_training
+from tests.helpers.interruptions import Interruptions
 from tests.helpers.tiny_training import TOY, TRANSFER
 
 AGAIN = pd.DataFrame(
@@ -81,23 +82,8 @@ def test_a_method_learns_without_each_subject_and_plays_its_settings(
 
 
 def test_an_interrupted_command_continues_with_equal_files(here: Path, monkeypatch: pytest.MonkeyPatch):
-    """It is interrupted at every tenth file that it writes."""
     assert main.main(validate("--runs", "whole")) == 0
-    write, written = atomic.write_atomically, 0
-
-    def interrupting(file: Path, content: Callable[[Path], object]) -> None:
-        nonlocal written
-        written += 1
-        if written % 10 == 0:
-            raise KeyboardInterrupt
-        write(file, content)
-
-    monkeypatch.setattr(atomic, "write_atomically", interrupting)
-    codes = [code := main.main(validate("--runs", "broken"))]
-    while code == 130 and len(codes) < 50:
-        codes.append(code := main.main(validate("--runs", "broken")))
-    assert codes[0] == 130
-    assert codes[-1] == 0
+    Interruptions(monkeypatch).finish(lambda: main.main(validate("--runs", "broken")))
     assert tiny_training.contents(here / "broken") == tiny_training.contents(here / "whole")
 
 

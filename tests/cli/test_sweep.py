@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,10 @@ import pytest
 
 from dextron_bench.cli import main
 from dextron_bench.scores.figures import sweeps
-from dextron_bench.storage import atomic, folders
+from dextron_bench.storage import folders
 from dextron_bench.sweeps import optuna_search
 from tests.helpers import tiny_benchmark, tiny_training
+from tests.helpers.interruptions import Interruptions
 from tests.helpers.tiny_training import TOY
 
 AGENT = """
@@ -108,32 +109,17 @@ def test_the_scores_are_drawn_against_the_setting(here: Path, monkeypatch: pytes
 
 
 def test_an_interrupted_sweep_continues_with_equal_results(here: Path, monkeypatch: pytest.MonkeyPatch):
-    """It is interrupted at every tenth file that it writes."""
-
     def run(runs: str) -> int:
         words = ["--preset", "smoke", "--search", "rate=0.01..1:log", "--trials", "3", "--seed", "0", "1"]
         return main.main(sweep(*words, "--runs", runs, method=TOY))
 
     assert run("whole") == 0
-    write, written = atomic.write_atomically, 0
-
-    def interrupting(file: Path, content: Callable[[Path], object]) -> None:
-        nonlocal written
-        written += 1
-        if written % 10 == 0:
-            raise KeyboardInterrupt
-        write(file, content)
-
-    monkeypatch.setattr(atomic, "write_atomically", interrupting)
-    codes = [code := run("broken")]
-    while code == 130 and len(codes) < 50:
-        codes.append(code := run("broken"))
-    assert codes[0] == 130
-    assert codes[-1] == 0
+    interruptions = Interruptions(monkeypatch)
+    interruptions.finish(lambda: run("broken"))
     assert tiny_training.contents(here / "broken") == tiny_training.contents(here / "whole")
-    before = written
+    before = interruptions.written
     assert run("broken") == 0
-    assert written == before  # Nothing is left to do.
+    assert interruptions.written == before  # Nothing is left to do.
 
 
 def test_more_trials_continue_the_same_search(here: Path):
