@@ -27,6 +27,7 @@ from tests.helpers import tiny_training
 Blocks = Iterator[tuple[int, pd.DataFrame]]  # Numbers of blocks, and their draws.
 ROOT = str(Path(__file__).parents[2])
 DATA = "TINY_BENCHMARK"  # Names the folder with its splits.
+failures: list[str] = []  # Why Ray itself does not start here; it is not tried again.
 
 
 def perform(expected: Mapping[str, str | None], pickled: bytes, places: Mapping[str, str], *contents: bytes) -> Reply:
@@ -73,7 +74,13 @@ def started(folder: Path, monkeypatch: pytest.MonkeyPatch, nodes: int = 1, memor
     monkeypatch.setattr(ray_cluster, "PERFORM", perform)
     stored = {"object_store_memory": memory} if memory else {}
     head = {"num_cpus": 0, "include_dashboard": False, **stored}
-    cluster = utils.Cluster(initialize_head=True, head_node_args=head)
+    if failures:
+        pytest.skip(failures[0])
+    try:
+        cluster = utils.Cluster(initialize_head=True, head_node_args=head)
+    except Exception as error:
+        failures.append(f"Ray does not start on this machine: {error}")
+        pytest.skip(failures[0])
     try:
         for _ in range(nodes):
             cluster.add_node(num_cpus=1, **stored)
