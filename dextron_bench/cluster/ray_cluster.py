@@ -8,7 +8,7 @@ import os
 import pickle
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import ExitStack, contextmanager, redirect_stdout
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -63,14 +63,16 @@ class RayCluster:
         if self._address.startswith(REMOTE) and TOKEN.expanduser().exists():
             os.environ.setdefault("RAY_AUTH_MODE", "token")  # Only nodes of a cluster find out by themselves.
         self._ray = importlib.import_module("ray")
-        with _without_messages():
+        with ExitStack() as quiet:
+            quiet.enter_context(_without_messages())
             self._connect()
+            self._quiet = quiet.pop_all()
         self._perform = self._ray.remote(PERFORM)
         self._inputs = inputs.References(self._ray.put)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        with _without_messages():
+        with self._quiet:
             self._ray.shutdown()
 
     def run(self, next_task: Next, done: Done) -> None:
@@ -80,18 +82,17 @@ class RayCluster:
         way are cancelled. Raises PieceFailed, OtherVersion, BadCluster, DamagedFile.
         """
         again: deque[Task] = deque()
-        with _without_messages():
-            try:
-                while self._fill(next_task, again):
-                    for task, reply in self._replies():
-                        if reply is None:
-                            again.append(task)
-                            continue
-                        write_files(reply.files, self._runs)
-                        if done(task):
-                            return
-            finally:
-                self._cancel()
+        try:
+            while self._fill(next_task, again):
+                for task, reply in self._replies():
+                    if reply is None:
+                        again.append(task)
+                        continue
+                    write_files(reply.files, self._runs)
+                    if done(task):
+                        return
+        finally:
+            self._cancel()
 
     def run_all(self, tasks: Sequence[Task], progress: Progress = no_progress) -> None:
         """Does tasks; `progress` receives how many are done. Raises the errors of `run`."""
@@ -192,6 +193,6 @@ class RemoteError(Exception):
 
 @contextmanager
 def _without_messages() -> Iterator[None]:
-    """Keeps Ray's messages out of the results: it prints about lost nodes on stdout."""
+    """Keeps Ray's messages out of the results: its threads print about lost nodes and processes on stdout."""
     with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):
         yield
