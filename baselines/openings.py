@@ -1,4 +1,4 @@
-"""Openings of the settings of `train`, kept in files by reach: what the labels of STOPPING are made of.
+"""Openings of the settings of `train` and of settings near them, kept in files by reach: the labels of STOPPING.
 
 The forks are a privilege of training: they need a simulator that can be copied. An agent sees states alone.
 """
@@ -9,12 +9,17 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from dextron_bench import Setting, Track
-from dextron_bench.experts.openings import EVERY, NEAR, TOGETHER, Episode, Openings, joined, play
+from dextron_bench.experts.openings import EVERY, NEAR, NO_DECISION, SUCCEEDS, TOGETHER, Episode, Openings, joined, play
+from dextron_bench.reaches.setting import OFFSET
 from dextron_bench.storage import atomic, hashing, tensors
-from dextron_bench.world import model
+from dextron_bench.world import model, task
 
 FORMAT = 1  # Version of the cached file.
+AROUND = 0.01  # [m] largest distance, in x and in y, of a nearby setting's offset.
+LATER = 0.05, 0.25  # By how much its duration noise is larger; `hard` keeps the noise, so no row is near-equal.
 
 
 def settings_of(track: Track) -> list[Setting]:
@@ -22,19 +27,34 @@ def settings_of(track: Track) -> list[Setting]:
     return list(dict.fromkeys(case.setting for case in track.cases))
 
 
-def load(track: Track) -> Openings:
-    """The openings of a track's settings, played or from its cache; raises DamagedFile.
+def load(track: Track, settings: Sequence[Setting]) -> list[Episode]:
+    """The opening of each setting, played or from the track's cache; raises DamagedFile.
 
     The cache has a file for each reach. So a killed call continues, and other choices of reaches share the files.
     """
-    settings = settings_of(track)
     by_reach: dict[str, list[Setting]] = {}
     for setting in settings:
         by_reach.setdefault(setting.reach, []).append(setting)
     groups = [(track.cache / f"openings-{_digest(group)[:16]}.safetensors", group) for group in by_reach.values()]
     _play_missing(track, [(file, group) for file, group in groups if not file.exists()])
     episodes = {setting: one for file, group in groups for setting, one in zip(group, _read(file), strict=True)}
-    return joined([episodes[setting] for setting in settings])
+    return [episodes[setting] for setting in settings]
+
+
+def rule_succeeds(episode: Episode, edge: float) -> bool:
+    """True if closing succeeds at the first decision of an opening that lies within `edge` [m] of the bottle."""
+    states, outcomes = episode
+    within = outcomes[(outcomes != NO_DECISION) & (task.distance(states.astype(float)) < edge)]
+    return bool(within.size) and within[0] == SUCCEEDS
+
+
+def nearby(setting: Setting, copies: int) -> list[Setting]:
+    """Settings near a setting: with other offsets, and reaches that take a little longer."""
+    rng = np.random.default_rng(int(hashing.digest(repr(setting).encode())[:16], 16))
+    moves = rng.uniform(-AROUND, AROUND, (copies, 2))
+    offsets = np.clip(np.add(moves, [setting.offset_x, setting.offset_y]), -OFFSET, OFFSET)
+    noise = setting.duration_noise + rng.uniform(*LATER, (copies, 1))
+    return [Setting(setting.reach, *values) for values in np.concatenate([offsets, noise], axis=1).tolist()]
 
 
 def _play_missing(track: Track, groups: Sequence[tuple[Path, list[Setting]]]) -> None:
@@ -58,10 +78,9 @@ def _play_missing(track: Track, groups: Sequence[tuple[Path, list[Setting]]]) ->
 def _read(file: Path) -> list[Episode]:
     """The openings in a file; raises DamagedFile."""
     try:
-        stored = Openings(**tensors.read(file))
+        return Openings(**tensors.read(file)).episodes()
     except (tensors.BadTensors, TypeError) as error:
         raise atomic.DamagedFile(file, error) from error
-    return [(stored.states[rows], stored.outcomes[rows]) for rows in map(stored.rows, range(len(stored)))]
 
 
 def _digest(settings: Sequence[Setting]) -> str:

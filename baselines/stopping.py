@@ -10,10 +10,13 @@ import numpy as np
 
 from baselines import openings, pose_features, stopping_trainer
 from baselines.normalise import CLIP
-from dextron_bench import Perceptron, Track, Trainer
-from dextron_bench.experts.openings import EVERY, NEAR
+from baselines.stopping_trainer import EDGE
+from dextron_bench import Perceptron, Setting, Track, Trainer
+from dextron_bench.experts.openings import EVERY, NEAR, SUCCEEDS, Episode
 from dextron_bench.methods.exact import rounded
 from dextron_bench.world import task
+
+NEARBY = 5  # Chosen on `val` and on settings drawn like those of `hard`.
 
 
 class BadNumber(ValueError):
@@ -34,14 +37,20 @@ class Stopping:
     settings: int = 0
     """Number of settings of `train` to learn from; 0 takes all."""
 
+    nearby: int = NEARBY
+    """Number of settings to try near each setting that the rule of thumb fails."""
+
     def __post_init__(self) -> None:
         if self.settings < 0:
             raise BadNumber(f"--settings is {self.settings}; give how many to learn from, or 0 for all")
+        if self.nearby < 0:
+            raise BadNumber(f"--nearby is {self.nearby}; give how many to try near each setting, or 0 for none")
 
     @property
     def label(self) -> str:
-        """The name, with the number of settings if it is limited."""
-        return f"{self.name}-{self.settings}" if self.settings else self.name
+        """The name, with the numbers of settings that are not the defaults."""
+        limit = f"-{self.settings}" if self.settings else ""
+        return self.name + limit + (f"-nearby{self.nearby}" if self.nearby != NEARBY else "")
 
     @property
     def epochs(self) -> int:
@@ -60,10 +69,17 @@ class Stopping:
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """A trainer with several networks per seed, all trained together."""
-        played = openings.load(track)
-        count = min(self.settings or len(played), len(played))
-        decisions = stopping_trainer.Decisions(played, count, track.device)
+        settings = openings.settings_of(track)[: self.settings or None]
+        played = openings.load(track, openings.settings_of(track))[: len(settings)]
+        decisions = stopping_trainer.Decisions([*played, *self._nearby(track, settings, played)], track.device)
         return stopping_trainer.StoppingTrainer(decisions, seeds, track.device)
+
+    def _nearby(self, track: Track, settings: Sequence[Setting], played: Sequence[Episode]) -> list[Episode]:
+        """The openings near settings that the rule fails, with their openings; only those in which closing can succeed."""
+        pairs = zip(settings, played, strict=True)
+        failed = [setting for setting, episode in pairs if not openings.rule_succeeds(episode, EDGE)]
+        near = openings.load(track, [one for setting in failed for one in openings.nearby(setting, self.nearby)])
+        return [episode for episode in near if (episode[1] == SUCCEEDS).any()]
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> StoppingAgent:
         """The agent that closes when the mean output of its networks is positive."""

@@ -12,13 +12,13 @@ from torch.nn.functional import binary_cross_entropy_with_logits, logsigmoid, pa
 from baselines import pose_features, snapshot
 from baselines.networks import Stack
 from baselines.normalise import CLIP, EPSILON
-from dextron_bench.experts.openings import NO_DECISION, Openings
+from dextron_bench.experts.openings import NO_DECISION, Episode
 from dextron_bench.methods.learners import Arrays
 
 MEMBERS = 5  # Networks of an agent, whose outputs are averaged.
 HIDDEN = 48
 DROPOUT = 0.1  # Share of the hidden units that an episode of a batch goes without.
-EPOCHS, UPDATES = 15, 100  # Number of epochs, and of updates in each.
+EPOCHS, UPDATES = 30, 100  # Number of epochs, and of updates in each.
 BATCH = 96  # Episodes.
 LEARNING_RATE, WEIGHT_DECAY = 3e-3, 0.03
 RISING = 0.3  # Share of the updates in which the learning rate rises.
@@ -30,12 +30,12 @@ NEVER = -30.0  # The logit of closing where there is no decision.
 class Decisions:
     """The decisions of N openings, padded to D: scaled features (N, D, F); distance, outcome, validity, each (N, D)."""
 
-    def __init__(self, played: Openings, count: int, device: str) -> None:
-        """Takes the first `count` openings; `mean` and `deviation` (F,) scale the features."""
-        episodes = [self._of(played, number) for number in range(count)]
+    def __init__(self, openings: Sequence[Episode], device: str) -> None:
+        """Takes openings; `mean` and `deviation` (F,) scale the features."""
+        episodes = [self._of(*opening) for opening in openings]
         seen = np.concatenate([features for features, _ in episodes])
         self.mean, self.deviation = seen.mean(axis=0), np.sqrt(seen.var(axis=0) + EPSILON)
-        shape = count, max(len(outcomes) for _, outcomes in episodes)
+        shape = len(episodes), max(len(outcomes) for _, outcomes in episodes)
         scaled = np.zeros((*shape, pose_features.COUNT), np.float32)
         distance, outcome, valid = np.ones(shape, np.float32), *np.zeros((2, *shape), np.float32)
         for k, (features, outcomes) in enumerate(episodes):
@@ -53,11 +53,10 @@ class Decisions:
         return self._scaled[numbers], self._distance[numbers], self._outcome[numbers], self._valid[numbers]
 
     @staticmethod
-    def _of(played: Openings, number: int) -> tuple[np.ndarray, np.ndarray]:
+    def _of(states: np.ndarray, outcomes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Features (d, F) and outcomes (d,) of an opening's decisions."""
-        rows = played.rows(number)
-        decided = played.outcomes[rows] != NO_DECISION
-        return pose_features.of_episode(played.states[rows].astype(float))[decided], played.outcomes[rows][decided]
+        decided = outcomes != NO_DECISION
+        return pose_features.of_episode(states.astype(float))[decided], outcomes[decided]
 
 
 def expected_success(logits: Tensor, outcomes: Tensor) -> Tensor:

@@ -41,6 +41,10 @@ class Openings:
         """The rows of an episode."""
         return slice(self.starts[episode], self.starts[episode + 1])
 
+    def episodes(self) -> list[Episode]:
+        """States and outcomes of each episode."""
+        return [(self.states[rows], self.outcomes[rows]) for rows in map(self.rows, range(len(self)))]
+
 
 def play(source: Source, settings: Sequence[Setting], threads: int = 0) -> list[Episode]:
     """The openings of some settings."""

@@ -13,9 +13,11 @@ from torch.testing import assert_close
 from baselines import openings, pose_features, stopping_trainer
 from baselines.stopping import BadNumber, Stopping, StoppingAgent
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.experts.openings import SUCCEEDS, Openings
+from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Openings
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import Arrays, Track
+from dextron_bench.reaches.setting import OFFSET, Setting
+from dextron_bench.splits.near_equal import NEAR_NOISE
 from dextron_bench.world import model, task
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
@@ -34,20 +36,44 @@ def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
     reported: list[tuple[int, int]] = []
     everything = Track(SOURCE, CASES * 2, tmp_path, 1, report=lambda done, total, note: reported.append((done, total)))
     first_reach = SETTINGS[0].reach
-    first = openings.load(everything)
+    first = openings.load(everything, openings.settings_of(everything))
     assert len(first) == len(CASES)  # Each setting counts once.
     assert reported == [(0, 5), (0, 5)]  # Both reaches are played together.
-    for name in ("states", "outcomes", "starts"):
-        np.testing.assert_array_equal(getattr(first, name), getattr(played, name))
+    for loaded, expected in zip(first, played.episodes(), strict=True):
+        np.testing.assert_array_equal(loaded[0], expected[0])
+        np.testing.assert_array_equal(loaded[1], expected[1])
     monkeypatch.setattr(openings, "play", None)
     others = [case for case in CASES if case.setting.reach != first_reach]
-    part = openings.load(Track(SOURCE, others, tmp_path, threads=1))
-    rows = [k for k, case in enumerate(CASES) if case.setting.reach != first_reach]
-    np.testing.assert_array_equal(part.outcomes, np.concatenate([first.outcomes[first.rows(k)] for k in rows]))
+    part = openings.load(Track(SOURCE, others, tmp_path, threads=1), [case.setting for case in others])
+    expected = [outcomes for case, (_, outcomes) in zip(CASES, first, strict=True) if case in others]
+    np.testing.assert_array_equal(np.concatenate([outcomes for _, outcomes in part]), np.concatenate(expected))
     file = min(tmp_path.iterdir())
     file.write_bytes(file.read_bytes()[:-10])
     with pytest.raises(Exception, match=file.name):
-        openings.load(everything)
+        openings.load(everything, openings.settings_of(everything))
+
+
+def test_nearby_settings_are_near_equal_to_no_row_that_is_drawn_with_an_equal_duration():
+    setting = Setting("a", OFFSET, -0.01, 0.3)
+    near = openings.nearby(setting, 50)
+    assert near == openings.nearby(setting, 50)
+    assert near[:2] != openings.nearby(Setting("a", OFFSET, -0.01, 0.31), 50)[:2]
+    moved = np.array([[one.offset_x, one.offset_y + 0.01, one.duration_noise - 0.3] for one in near])
+    assert {one.reach for one in near} == {"a"}
+    assert OFFSET - 0.01 <= moved[:, 0].min() < moved[:, 0].max() == OFFSET  # Clipped to the largest offset.
+    assert -0.01 <= moved[:, 1].min() < -0.005 < 0.005 < moved[:, 1].max() <= 0.01
+    assert NEAR_NOISE < moved[:, 2].min() < moved[:, 2].max() <= 0.25
+
+
+def test_the_rule_closes_at_the_first_decision_within_its_distance():
+    """Decisions at 0.10, 0.06 and 0.04 m, and a state without one at 0.05 m."""
+    states = np.zeros((4, model.STATE))
+    states[:, :25] = model.initial_qpos()
+    states[:, model.PALM_POSITION] = 0.0
+    centre = task.palm_centre(states)[0]
+    states[:, model.BOTTLE_POSITION] = np.add(centre, [[d, 0.0, 0.0] for d in (0.10, 0.06, 0.05, 0.04)])
+    episode = states, np.array([FAILS, SUCCEEDS, NO_DECISION, FAILS], np.int8)
+    assert [openings.rule_succeeds(episode, edge) for edge in (0.11, 0.07, 0.055, 0.01)] == [False, True, False, False]
 
 
 def test_measurements_of_a_pose_by_hand():
@@ -132,7 +158,7 @@ def trainer(tmp_path: Path, played: Openings) -> Callable[..., stopping_trainer.
     """Makes trainers on the short settings."""
 
     def make(*seeds: int) -> stopping_trainer.StoppingTrainer:
-        return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(played, len(played), "cpu"), seeds)
+        return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(played.episodes(), "cpu"), seeds)
 
     return make
 
@@ -152,3 +178,9 @@ def test_training_learns_to_close_where_closing_succeeds(
 def test_impossible_numbers_are_refused():
     with pytest.raises(BadNumber, match="--settings is -1"):
         Stopping(settings=-1)
+    with pytest.raises(BadNumber, match="--nearby is -2"):
+        Stopping(nearby=-2)
+
+
+def test_labels_name_the_numbers_that_are_not_the_defaults():
+    assert [Stopping().label, Stopping(settings=400, nearby=0).label] == ["stopping", "stopping-400-nearby0"]
