@@ -16,7 +16,7 @@ from dextron_bench.experts.openings import EVERY, NEAR, SUCCEEDS, Episode
 from dextron_bench.methods.exact import rounded
 from dextron_bench.world import task
 
-NEARBY = 5  # Chosen on `val` and on settings drawn like those of `hard`.
+NEARBY = 5  # Chosen on `val` and on settings that are drawn like the rows of `hard` (docs/baselines.md).
 
 
 class BadNumber(ValueError):
@@ -75,7 +75,7 @@ class Stopping:
         return stopping_trainer.StoppingTrainer(decisions, seeds, track.device)
 
     def _nearby(self, track: Track, settings: Sequence[Setting], played: Sequence[Episode]) -> list[Episode]:
-        """The openings near settings that the rule fails, with their openings; only those in which closing can succeed."""
+        """The openings near settings (with their openings `played`) that the rule fails, if closing can succeed."""
         pairs = zip(settings, played, strict=True)
         failed = [setting for setting, episode in pairs if not openings.rule_succeeds(episode, EDGE)]
         near = openings.load(track, [one for setting in failed for one in openings.nearby(setting, self.nearby)])
