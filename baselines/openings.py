@@ -18,8 +18,8 @@ from dextron_bench.storage import atomic, hashing, tensors
 from dextron_bench.world import model, task
 
 FORMAT = 1  # Version of the cached file.
-AROUND = 0.01  # [m] largest distance, in x and in y, of a nearby setting's offset.
-LATER = 0.05, 0.25  # By how much its duration noise is larger; `hard` keeps the noise, so no row is near-equal.
+OFFSET_SHIFT = 0.01  # [m] largest shift of the offset of a nearby setting, in x and in y.
+NOISE_SHIFT = 0.05, 0.25  # Added to its duration noise. The rows of `hard` keep the noise, so none is near-equal.
 
 
 def settings_of(track: Track) -> list[Setting]:
@@ -51,9 +51,9 @@ def rule_succeeds(episode: Episode, edge: float) -> bool:
 def nearby(setting: Setting, copies: int) -> list[Setting]:
     """Settings near a setting: with other offsets, and reaches that take a little longer."""
     rng = np.random.default_rng(int(hashing.digest(repr(setting).encode())[:16], 16))
-    moves = rng.uniform(-AROUND, AROUND, (copies, 2))
+    moves = rng.uniform(-OFFSET_SHIFT, OFFSET_SHIFT, (copies, 2))
     offsets = np.clip(np.add(moves, [setting.offset_x, setting.offset_y]), -OFFSET, OFFSET)
-    noise = setting.duration_noise + rng.uniform(*LATER, (copies, 1))
+    noise = setting.duration_noise + rng.uniform(*NOISE_SHIFT, (copies, 1))
     return [Setting(setting.reach, *values) for values in np.concatenate([offsets, noise], axis=1).tolist()]
 
 
