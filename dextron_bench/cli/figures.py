@@ -69,7 +69,7 @@ class Figures:
         from dextron_bench.scores.figures.training import learning_curves
 
         rows = standings.table(result_files.results(self.results)) if self.results.exists() else None
-        for name, cloned, epochs in (("fig4a", False, "epochs of 1,000 frames"), ("fig4c", True, "epochs of cloning")):
+        for name, cloned, epochs in (("fig4a", False, "epochs of 1,000 frames"), ("fig4c", True, "epochs of training")):
             all_curves = build.learning_curves(self.results, cloned)
             curves = {method: seeds for (method, reaches), seeds in all_curves.items() if reaches == self.reaches}
             if curves and rows is not None:
