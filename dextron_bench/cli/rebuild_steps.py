@@ -152,7 +152,7 @@ STEPS: tuple[Step, ...] = (
     ),
     Step(
         "fresh",
-        ("leaderboard fresh",),
+        ("leaderboard fresh --rows 100",),
         needs=(SPLITS, f"{WEIGHTS}/*/*/*.safetensors"),
         makes=("leaderboard/fresh/*",),
     ),

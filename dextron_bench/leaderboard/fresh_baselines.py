@@ -30,18 +30,32 @@ def settings_of_board(
     """The fresh settings of a board's baselines on a source: the stored ones, or new ones if these are others.
 
     Baselines have no bundle: the hash of the physics takes the place of its hash. Without a beacon, the stored settings
-    are right if there are some. Raises DamagedFile.
+    are right if they are of the same physics. Raises DamagedFile.
+    """
+    physics, stored = model.mjcf_hash(), stored_settings(board, reaches)
+    if stored is not None:
+        known = stored[0]
+        if known.submission == physics and beacon in ("", known.beacon) and rows in (0, known.rows):
+            return stored
+    fresh = FreshSettings(physics, beacon, rows) if beacon else FreshSettings(physics, rows=rows)
+    splits = fresh.draw(reaches, threads, report)
+    file = board / FOLDER / f"{reaches}.parquet"
+    tables.write(file, to_frame(splits))
+    atomic.write_json(file.with_suffix(".json"), asdict(fresh))
+    return fresh, splits
+
+
+def stored_settings(board: Path, reaches: str) -> tuple[FreshSettings, list[Split]] | None:
+    """The fresh settings that a board's baselines on a source have played; None if there are none.
+
+    Raises DamagedFile.
     """
     file = board / FOLDER / f"{reaches}.parquet"
     about = file.with_suffix(".json")
-    stored = FreshSettings(**schemas.read(about, schemas.FRESH_SETTINGS)) if about.exists() and file.exists() else None
-    if stored is not None and beacon in ("", stored.beacon) and rows in (0, stored.rows):
-        return stored, from_frame(_read(file, tables.CASES), reaches)
-    fresh = FreshSettings(model.mjcf_hash(), beacon, rows) if beacon else FreshSettings(model.mjcf_hash(), rows=rows)
-    splits = fresh.draw(reaches, threads, report)
-    tables.write(file, to_frame(splits))
-    atomic.write_json(about, asdict(fresh))
-    return fresh, splits
+    if not (about.exists() and file.exists()):
+        return None
+    fresh = FreshSettings(**schemas.read(about, schemas.FRESH_SETTINGS))
+    return fresh, from_frame(_read(file, tables.CASES), reaches)
 
 
 def play(
@@ -66,10 +80,10 @@ def problems(
     if run.fresh.exists():
         splits = from_frame(_read(run.fresh, tables.FRESH_EPISODES), reaches)
         faults = _faults_of_submission(run, claimed, splits, threads, report)
-    elif not all((board / FOLDER / f"{reaches}{end}").exists() for end in (".json", ".parquet")):
+    elif (known := stored_settings(board, reaches)) is None:
         return [f"its fresh settings are missing from {board / FOLDER}"]
     else:
-        stored, splits = settings_of_board(board, reaches)
+        stored, splits = known
         if (stored.submission, stored.beacon) != (claimed["submission"], claimed["beacon"]):
             return ["it played other fresh settings than the other baselines"]
         faults = _faults_of_baseline(run, result, splits, count, threads)

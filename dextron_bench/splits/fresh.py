@@ -54,7 +54,7 @@ def draw(reaches: str, name: str, seed: int, engine: Engine, rows: int = 0, prog
         raise NoFreshSettings(f"{name} of {reaches} reaches is not drawn by a search; choose from {list(REACHES)}")
     source, count = open_source(reaches), rows or len(load_split(reaches, name).cases)
     if name == "hard":
-        table = _hard(source, reaches, count, seed, engine)
+        table = _hard(source, reaches, count, seed, engine, progress)
     else:
         names = {case.setting.reach for part in REACHES[name] for case in _cases(reaches, part)}
         table = solved(source, frozenset(names), count, seed, engine, progress)
@@ -108,12 +108,14 @@ def _cases(reaches: str, name: str) -> Sequence[Case]:
     return load_split(reaches, name).cases if name in known_splits(reaches) else ()
 
 
-def _hard(source: setting.Source, reaches: str, count: int, seed: int, engine: Engine) -> pd.DataFrame:
+def _hard(
+    source: setting.Source, reaches: str, count: int, seed: int, engine: Engine, progress: Progress
+) -> pd.DataFrame:
     """Fresh rows of `hard`, with the distance that is best for the rule of thumb on `val`."""
     scanner, sizes = Scanner(source, engine), Sizes()
     train, val = (_frame(_cases(reaches, name)) for name in ("train", "val"))
     distance = hard.best_distance(scanner, val)
-    rows = hard.draw(scanner, train, train.head(0), distance, seed, count, sizes.coarse, sizes.scan)
+    rows = hard.draw(scanner, train, train.head(0), distance, seed, count, sizes.coarse, sizes.scan, progress)
     return rows.assign(window=0.0)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
@@ -12,6 +11,7 @@ from dextron_bench.experts import policies
 from dextron_bench.reaches import reach, rotation, setting
 from dextron_bench.splits.near_equal import SETTING, without_near_equal
 from dextron_bench.splits.scanning import RANGE, Scanner, best_critical, success_window
+from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import task
 
 WINDOW = 0.08  # Largest window of a row.
@@ -31,6 +31,7 @@ def draw(
     count: int,
     coarse: int,
     fine: int,
+    progress: Progress = no_progress,
 ) -> pd.DataFrame:
     """`count` new settings near settings of `train` that the rule fails, with gain, best d_c and window.
 
@@ -38,30 +39,36 @@ def draw(
     is near-equal to one of `train` or `held_out`. A scan of `coarse` points sorts out most draws, and one of `fine`
     points decides.
     """
+
+    def by_rule(rows: pd.DataFrame) -> np.ndarray:
+        return rule_scores(scanner, rows, np.array([distance]))[:, 0] == task.SUCCESS
+
     settings = train.drop_duplicates(SETTING)
-    failed = settings[rule_scores(scanner, settings, np.array([distance]))[:, 0] < task.SUCCESS]
-    hard, by_rule = pd.DataFrame(), 0
-    blocks = _narrow(scanner, failed, seed, coarse, fine)
-    while len(hard) < count:
-        narrow = next(blocks)
-        rows = without_near_equal(without_near_equal(narrow, train), held_out)
-        solved = rule_scores(scanner, rows, np.array([distance]))[:, 0] == task.SUCCESS
-        kept = ~solved | (by_rule + np.cumsum(solved) <= RULE_SHARE * count)
-        by_rule += int((solved & kept).sum())
+    failed = settings[~by_rule(settings)]
+    hard, left = pd.DataFrame(), int(RULE_SHARE * count)  # `left`: how many more rows may be solved by the rule.
+    for number in itertools.count():
+        progress(min(len(hard), count), count)
+        if len(hard) >= count:
+            break
+        draws = _draw_block(failed, np.random.default_rng([seed, number, 5]))
+        if not left:  # Then no row that the rule solves is kept: it is sorted out before the scans, which take longer.
+            draws = draws[~by_rule(draws)]
+        rows = without_near_equal(without_near_equal(_narrow(scanner, draws, coarse, fine), train), held_out)
+        solved = by_rule(rows)
+        kept = ~solved | (np.cumsum(solved) <= left)
+        left -= int((solved & kept).sum())
         hard = pd.concat([hard, rows[kept]], ignore_index=True)
     return hard.head(count)
 
 
-def _narrow(scanner: Scanner, settings: pd.DataFrame, seed: int, coarse: int, fine: int) -> Iterator[pd.DataFrame]:
-    """The settings of one block of draws after the other, without end, that have a narrow window."""
-    for number in itertools.count():
-        draws = _draw_block(settings, np.random.default_rng([seed, number, 5]))
-        points = (scanner.scan(draws, coarse) == task.SUCCESS).sum(axis=1)
-        likely = draws[(points > 0) & (points <= np.ceil(WINDOW / RANGE * coarse))]
-        scores = scanner.scan(likely, fine)
-        windows = success_window(scores)
-        measured = likely.assign(critical=best_critical(scores), window=windows)
-        yield measured[(windows > 0) & (windows <= WINDOW)]
+def _narrow(scanner: Scanner, draws: pd.DataFrame, coarse: int, fine: int) -> pd.DataFrame:
+    """The draws that have a narrow window, with best d_c and window."""
+    points = (scanner.scan(draws, coarse) == task.SUCCESS).sum(axis=1)
+    likely = draws[(points > 0) & (points <= np.ceil(WINDOW / RANGE * coarse))]
+    scores = scanner.scan(likely, fine)
+    windows = success_window(scores)
+    measured = likely.assign(critical=best_critical(scores), window=windows)
+    return measured[(windows > 0) & (windows <= WINDOW)]
 
 
 def _draw_block(settings: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:

@@ -60,6 +60,10 @@ def test_all_baselines_play_one_draw_and_it_is_kept(board: Path, drawn: list[str
     assert "; fresh " in (board / "README.md").read_text()
     assert main.main(words("--beacon", "b")) == 0
     assert drawn == ["test", "unseen-reach"] * 2
+    about = board / "fresh" / "synthetic.json"
+    about.write_text(json.dumps(json.loads(about.read_text()) | {"submission": "0" * 64}))
+    assert main.main(words()) == 0  # The stored settings are of another physics.
+    assert drawn == ["test", "unseen-reach"] * 3
 
 
 def test_fresh_scores_of_baselines_are_verified(board: Path, drawn: list[str], capsys: pytest.CaptureFixture[str]):

@@ -64,6 +64,22 @@ def test_the_rule_solves_a_share_and_no_more(scanner, monkeypatch):
     assert (drawn["offset_y"] > 0.0).sum() == COUNT // 4
 
 
+def test_what_the_rule_solves_is_not_scanned_once_its_share_is_full(monkeypatch):
+    """Without a share, only settings that the rule fails are scanned."""
+    scanned = []
+
+    class Noting(MadeUp):
+        def scan(self, rows: pd.DataFrame, points: int) -> np.ndarray:
+            scanned.append(rows["offset_y"].max())
+            return super().scan(rows, points)
+
+    monkeypatch.setattr(hard, "RULE_SHARE", 0.0)
+    noting = Noting(SOURCE, None)  # type: ignore[arg-type]
+    drawn = hard.draw(noting, TRAIN, TRAIN.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
+    assert len(drawn) == COUNT
+    assert max(scanned) <= 0.0
+
+
 def test_offsets_stay_within_the_range_of_all_settings(scanner):
     train = TRAIN.head(1).assign(offset_y=-0.059)
     drawn = hard.draw(scanner, train, train.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
