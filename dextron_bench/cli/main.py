@@ -19,7 +19,9 @@ from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.cli.output import print_warning
 
-BLAS = "OPENBLAS_NUM_THREADS"  # NumPy's products are small here, so more threads would mostly wait for each other.
+# The products of NumPy and of torch are small here: more threads would mostly wait for each other, above all on a busy
+# machine.
+THREADS = {"OPENBLAS_NUM_THREADS": "blas", "OMP_NUM_THREADS": "openmp"}
 PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
 DESCRIPTION = """Grasping with a prosthetic hand that a person moves: a benchmark.
 
@@ -30,7 +32,7 @@ traceback."""
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; `arguments` default to `sys.argv`."""
-    _limit_blas_threads()
+    _limit_threads()
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words or bool(os.environ.get("DEXTRON_DEBUG"))
     words = [word for word in words if word != "--debug"]
@@ -54,14 +56,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
 
 
-def _limit_blas_threads() -> None:
-    """Gives NumPy's products one thread, unless the user sets OPENBLAS_NUM_THREADS."""
-    if BLAS in os.environ:
+def _limit_threads() -> None:
+    """Gives each product of NumPy and of torch one thread, unless the user sets a variable of THREADS."""
+    if not (limits := {library: 1 for name, library in THREADS.items() if name not in os.environ}):
         return
     import threadpoolctl
 
-    os.environ[BLAS] = "1"  # For libraries that are loaded later, such as SciPy's.
-    threadpoolctl.threadpool_limits(1, user_api="blas")  # For NumPy's, which `import dextron_bench` has loaded.
+    for name in THREADS:
+        os.environ.setdefault(name, "1")  # For libraries that are loaded later, such as SciPy's and torch's.
+    threadpoolctl.threadpool_limits(limits)  # For NumPy's, which `import dextron_bench` has loaded.
 
 
 def _is_utf8(text: str) -> bool:

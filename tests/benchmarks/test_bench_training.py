@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +28,7 @@ from tests.benchmarks.workload import default_source, draw_cases
 
 ROUNDS = 5
 FILLED = 1000  # Transitions in the buffer of Stable-Baselines3.
+BUSY = 8  # Other processes that use all of a processor.
 
 
 class RandomEnv(gymnasium.Env):
@@ -99,3 +105,49 @@ def test_cycles(benchmark: BenchmarkFixture, agents: int, tmp_path: Path) -> Non
         Row(checkpoint, "/s", 1 / write_seconds),
         Row(f"Memory of the whole process after a few epochs of {seeds}", "MB", memory),
     )
+
+
+def test_threads(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
+    """The default is one thread for the products of torch; the physics has all threads in both."""
+    track = Track(default_source(), draw_cases(24), tmp_path)
+    trainer = rl.trainer(track, range(3), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
+    trainer.advance()
+    cores = len(os.sched_getaffinity(0))
+
+    def cycles(threads: int) -> None:
+        torch.set_num_threads(threads)
+        trainer.advance()
+
+    seconds, reference = time_in_turns(benchmark, lambda: cycles(1), lambda: cycles(cores), ROUNDS)
+    what = "Cycles of RLIL 0.1 with 3 seeds, products of torch on one thread"
+    store_rows(benchmark, Row(what, "/s", 1 / seconds, f"on {cores} threads", 1 / reference, 0.9))
+
+
+def test_busy_machine(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
+    """A training beside other processes gets a share of the processors; more threads would wait for each other."""
+    words = ["run", "--method", "rlil", "--preset", "smoke", "--split", "val", "--no-floors", "--quiet"]
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+
+    def train(name: str) -> None:
+        command = [sys.executable, "-m", "dextron_bench", *words, "--runs", str(tmp_path / name)]
+        subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
+
+    quiet = time_once(lambda: train("quiet"))
+    with busy_processes():
+        seconds = time_work(benchmark, lambda: train("busy"), 1)
+    share = min(1.0, len(os.sched_getaffinity(0)) / (BUSY + 1))
+    what = f"Trainings of RLIL 0.1 with the preset smoke, beside {BUSY} busy processes"
+    against = f"{share:.2f} of the processors of a quiet machine"
+    store_rows(benchmark, Row(what, "trainings/h", 3600 / seconds, against, share * 3600 / quiet, 0.5))
+
+
+@contextmanager
+def busy_processes() -> Iterator[None]:
+    """Processes that use all of a processor."""
+    processes = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY)]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()

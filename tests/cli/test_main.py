@@ -256,14 +256,19 @@ def test_help_and_the_package_itself_import_nothing_heavy():
     assert not HEAVY & set(loaded.split())
 
 
-def test_products_of_numpy_use_one_thread_by_default():
+def test_products_of_numpy_and_torch_use_one_thread_by_default():
     script = (
-        "from dextron_bench.cli.main import main; main(['--version']); import numpy, threadpoolctl; "
-        "print({pool['num_threads'] for pool in threadpoolctl.threadpool_info()})"
+        "from dextron_bench.cli.main import main; main(['--version']); import numpy, threadpoolctl, torch; "
+        "pools = threadpoolctl.threadpool_info(); "
+        "print({p['num_threads'] for p in pools if p['internal_api'] == 'openblas'}, torch.get_num_threads())"
     )
     inherited = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     two = min(2, len(os.sched_getaffinity(0)))  # OpenBLAS starts no more threads than it has processors.
-    for more, threads in (({}, "{1}"), ({"OPENBLAS_NUM_THREADS": "2"}, f"{{{two}}}")):
+    for more, threads in (
+        ({}, "{1} 1"),
+        ({"OPENBLAS_NUM_THREADS": "2"}, f"{{{two}}} 1"),
+        ({"OMP_NUM_THREADS": "2"}, "{1} 2"),
+    ):
         done = subprocess.run(
             [sys.executable, "-c", script], env=inherited | more, capture_output=True, text=True, check=True
         )
