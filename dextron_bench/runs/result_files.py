@@ -11,7 +11,7 @@ import pandas as pd
 
 from dextron_bench.evaluation.episodes import action_hashes
 from dextron_bench.methods.registry import NAME
-from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage import atomic, provenance, schemas
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import RunFolder, run_folders, seed_folders
 
@@ -29,10 +29,10 @@ def write_result(folder: RunFolder, table: pd.DataFrame, about: dict[str, Any], 
     `seconds` of training belong to the provenance, since they differ each time.
     """
     config = schemas.read(folder.config, schemas.CONFIG)
-    provenance = schemas.read(folder.provenance, schemas.PROVENANCE)
-    provenance |= {} if seconds is None else {"seconds": seconds}
+    made_by = schemas.read(folder.provenance, schemas.PROVENANCE)
+    made_by |= {} if seconds is None else {"seconds": seconds}
     maker = {name: config[name] for name in MAKER if name in config}
-    result = {**about, "splits": scores_by_split(table), "provenance": provenance, "maker": maker}
+    result = {**about, "splits": scores_by_split(table), "provenance": made_by, "maker": maker}
     atomic.write_json(folder.result, result)
 
 
@@ -78,12 +78,12 @@ def published_results() -> Path:
 def published_beside(new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """The published results of other methods than these, on the splits and the physics that these results have too."""
     methods = {result["method"] for result in new}
-    physics = {result["provenance"]["physics"] for result in new}
+    physics = {provenance.physics_of(result) for result in new} - {""}
     digests = {split["digest"] for result in new for split in result["splits"].values()}
     return [
         result | {"splits": {name: split for name, split in result["splits"].items() if split["digest"] in digests}}
         for result in results(published_results())
-        if result["method"] not in methods and result["provenance"]["physics"] in physics
+        if result["method"] not in methods and provenance.physics_of(result) in physics
     ]
 
 

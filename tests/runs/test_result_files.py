@@ -147,3 +147,12 @@ def test_a_damaged_result_is_named(tmp_path: Path, text: str):
     file.write_text(text)
     with pytest.raises(DamagedFile, match=r"result\.json is damaged"):
         list(result_files.results(tmp_path))
+
+
+def test_published_results_of_another_physics_are_not_put_beside(runs: Path):
+    """A result that does not name its physics has nothing beside it."""
+    file = write(runs.parent / "published", "sor", 0)
+    file.write_text(json.dumps(RESULT | {"method": "sor", "provenance": {"physics": "b" * 64}}))
+    known = RESULT | {"provenance": {"physics": "b" * 64}}
+    assert [one["method"] for one in result_files.published_beside([known])] == ["sor"]
+    assert result_files.published_beside([RESULT]) == []
