@@ -1,4 +1,4 @@
-"""Mutations of every kind of file: no code 70, no hang, and no result that changes without a word.
+"""Mutations of every kind of file: no code 70, no hang, no gigabyte of memory, no result that changes without a word.
 
 Each mutation is made in a copy of a finished run, an unfinished training, a search, a board, a submission or a
 recording; then the command that reads the file runs again. Either it ends with one line and code 2 (1 for a refused
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import random
+import resource
 import shutil
 import signal
 import types
@@ -33,6 +34,7 @@ from tests.helpers.toy_learner import ToyTrainer
 
 COUNT, THOROUGH = 20, 300  # Mutations of each kind of file.
 LONGEST = 30  # [s] that a command may take.
+MOST_MEMORY = 2**30  # Bytes by which the memory of this process, or of a process that it starts, may grow.
 TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--no-floors", "--record", "0"]
 RUN = ["run", *TOY]
 BUILD = ["leaderboard", "build", "--runs", "runs", "--into", "board"]
@@ -185,6 +187,11 @@ def put(folder: Path, name: str, content: bytes) -> None:
         (folder / name).write_bytes(content)
 
 
+def peak_memory() -> int:
+    """The largest memory until now, in bytes, of this process and of any process that it started."""
+    return 1024 * max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+
+
 def timed_out(number: int, frame: types.FrameType | None) -> None:
     raise AssertionError(f"the command took more than {LONGEST} s")
 
@@ -203,6 +210,7 @@ def test_a_mutation_is_named_or_changes_nothing(
     rng = random.Random(f"{state} {name}")
     signal.signal(signal.SIGALRM, timed_out)
     original, codes = content_of(folders[state], name), []
+    limit = peak_memory() + MOST_MEMORY
     expected: dict[str, Any] = {}
     for number in range((THOROUGH if thorough else COUNT) + 1):
         folder = tmp_path / str(number)
@@ -224,4 +232,5 @@ def test_a_mutation_is_named_or_changes_nothing(
         if code == 0 and Path(name).name not in UNPROTECTED:
             assert after == expected, f"mutation {number}"
         shutil.rmtree(folder, ignore_errors=True)
+    assert peak_memory() < limit
     assert state != "unfinished" or np.mean(codes) > 1.0  # Most mutations are noticed.
