@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import re
 from collections.abc import Iterable
 from itertools import groupby
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 from dextron_bench.cli.method_flags import FIELD
 
 RULE = "-"  # Separates the parts of tyro's messages.
-UNKNOWN = "Unrecognized options: "
+UNKNOWN = re.compile(r"Unrecognized (?:or misplaced )?options: ([^\s,;=]+)")
 
 
 def one_line(box: str) -> str:
@@ -26,9 +27,9 @@ def one_line(box: str) -> str:
 
 def with_nearest(message: str, known: Iterable[str]) -> str:
     """The line about an unknown word with the nearest of the `known` flags or commands; other lines unchanged."""
-    if not message.startswith(UNKNOWN):
+    if not (match := UNKNOWN.match(message)):
         return message
-    word = message.removeprefix(UNKNOWN).partition(";")[0].split(", ")[0].partition("=")[0]
+    word = match[1]
     [nearest] = difflib.get_close_matches(word, known, 1) or [""]
     kind = "flag" if word.startswith("-") else "word"
     return f"unknown {kind} {word}" + (f"; did you mean {nearest}?" if nearest else "")

@@ -38,6 +38,8 @@ def test_a_box_becomes_one_line(box: str):
         ("run --method-settings 3", "unknown flag --method-settings; did you mean --method?; see"),
         ("run --sed=3", "unknown flag --sed; did you mean --seed?; see `dextron-bench run --help`"),
         ("rnu", "unknown word rnu; did you mean run?; see `dextron-bench --help`"),
+        ("leaderboard show --rnus x", "unknown flag --rnus; did you mean --runs?; see `dextron-bench leaderboard show"),
+        ("leaderboard show --board x", "unknown flag --board; see `dextron-bench leaderboard show --help`"),
         ("leaderboard shwo", "unknown word shwo; did you mean show?; see `dextron-bench leaderboard --help`"),
         ("run qqqqq", "unknown word qqqqq; see `dextron-bench run --help`"),
     ],
