@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
 
-from baselines import openings, pose_features, stopping_trainer
+from baselines import generated_reaches, openings, pose_features, stopping_trainer
 from baselines.normalise import CLIP
 from baselines.stopping_trainer import EDGE
 from dextron_bench import Perceptron, Setting, Track, Trainer
@@ -40,17 +40,23 @@ class Stopping:
     nearby: int = NEARBY
     """Number of settings to try near each setting that the rule of thumb fails."""
 
+    generated: int = 0
+    """Number of settings on new reaches, from a model that is fitted to the reaches of `train`."""
+
     def __post_init__(self) -> None:
         if self.settings < 0:
             raise BadNumber(f"--settings is {self.settings}; give how many to learn from, or 0 for all")
         if self.nearby < 0:
             raise BadNumber(f"--nearby is {self.nearby}; give how many to try near each setting, or 0 for none")
+        if self.generated < 0:
+            raise BadNumber(f"--generated is {self.generated}; give how many to try on new reaches, or 0 for none")
 
     @property
     def label(self) -> str:
         """The name, with the numbers of settings that are not the defaults."""
         limit = f"-{self.settings}" if self.settings else ""
-        return self.name + limit + (f"-nearby{self.nearby}" if self.nearby != NEARBY else "")
+        nearby = f"-nearby{self.nearby}" if self.nearby != NEARBY else ""
+        return self.name + limit + nearby + (f"-generated{self.generated}" if self.generated else "")
 
     @property
     def epochs(self) -> int:
@@ -71,8 +77,8 @@ class Stopping:
         """A trainer with several networks per seed, all trained together."""
         settings = openings.settings_of(track)[: self.settings or None]
         played = openings.load(track, openings.settings_of(track))[: len(settings)]
-        decisions = stopping_trainer.Decisions([*played, *self._nearby(track, settings, played)], track.device)
-        return stopping_trainer.StoppingTrainer(decisions, seeds, track.device)
+        episodes = [*played, *self._nearby(track, settings, played), *self._generated(track, settings)]
+        return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(episodes, track.device), seeds, track.device)
 
     def _nearby(self, track: Track, settings: Sequence[Setting], played: Sequence[Episode]) -> list[Episode]:
         """The openings near settings (with their openings `played`) that the rule fails, if closing can succeed."""
@@ -80,6 +86,14 @@ class Stopping:
         failed = [setting for setting, episode in pairs if not openings.rule_succeeds(episode, EDGE)]
         near = openings.load(track, [one for setting in failed for one in openings.nearby(setting, self.nearby)])
         return [episode for episode in near if (episode[1] == SUCCEEDS).any()]
+
+    def _generated(self, track: Track, settings: Sequence[Setting]) -> list[Episode]:
+        """The openings on reaches that are generated from the reaches of settings, if closing can succeed."""
+        if not self.generated:
+            return []
+        source, new = generated_reaches.generate(track.source, settings, self.generated)
+        played = openings.load(replace(track, source=source), new)
+        return [episode for episode in played if (episode[1] == SUCCEEDS).any()]
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> StoppingAgent:
         """The agent that closes when the mean output of its networks is positive."""

@@ -119,6 +119,7 @@ STEPS: tuple[Step, ...] = (
     *(_quick(label, flags, "synthetic") for label, flags in LEARNERS.items()),
     _quick("sor", "sor", "synthetic", needs=(SIM_QUICK,)),
     *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
+    _run("stopping-generated2000", "stopping --generated 2000", "real", SEEDS),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
     _run("sor", "sor", "real", SEEDS, (SIM,)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from baselines import openings, pose_features, stopping_trainer
+from baselines import generated_reaches, openings, pose_features, stopping_trainer
 from baselines.stopping import BadNumber, Stopping, StoppingAgent
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Openings
@@ -175,12 +175,35 @@ def test_training_learns_to_close_where_closing_succeeds(
     assert scores == [task.SUCCESS] * len(solvable)
 
 
+def test_it_learns_from_what_closing_can_solve_on_generated_reaches_too(
+    played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The generated reaches are the short ones again, so each setting that can be solved counts twice."""
+    asked: list[tuple[Sequence[Setting], int]] = []
+
+    def generate(source: object, known: Sequence[Setting], count: int) -> object:
+        asked.append((known, count))
+        return SOURCE, SETTINGS
+
+    monkeypatch.setattr(generated_reaches, "generate", generate)
+    given: list[int] = []
+    monkeypatch.setattr(stopping_trainer, "Decisions", lambda episodes, device: given.append(len(episodes)))
+    monkeypatch.setattr(stopping_trainer, "StoppingTrainer", lambda *_: None)
+    Stopping(nearby=0, generated=7).trainer(Track(SOURCE, CASES, tmp_path, threads=1), [0])
+    assert asked == [(list(SETTINGS), 7)]
+    solvable = sum((outcomes == SUCCEEDS).any() for _, outcomes in played.episodes())
+    assert given == [len(SETTINGS) + solvable]
+
+
 def test_impossible_numbers_are_refused():
     with pytest.raises(BadNumber, match="--settings is -1"):
         Stopping(settings=-1)
     with pytest.raises(BadNumber, match="--nearby is -2"):
         Stopping(nearby=-2)
+    with pytest.raises(BadNumber, match="--generated is -1"):
+        Stopping(generated=-1)
 
 
 def test_labels_name_the_numbers_that_are_not_the_defaults():
     assert [Stopping().label, Stopping(settings=400, nearby=0).label] == ["stopping", "stopping-400-nearby0"]
+    assert Stopping(generated=100).label == "stopping-generated100"

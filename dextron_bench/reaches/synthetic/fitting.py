@@ -1,6 +1,7 @@
 """Fits the synthetic model to recorded reaches.
 
-The session of a reach is its name up to the last underscore: `01_fl` for `01_fl_16`.
+The session of a reach is its name up to the last underscore: `01_fl` for `01_fl_16`. Reaches without an underscore in
+their names have one session for each subject.
 """
 
 from __future__ import annotations
@@ -56,10 +57,11 @@ class Groups:
     @classmethod
     def from_reaches(cls, reaches: Sequence[Reach]) -> Groups:
         """The groups of reaches. Sessions and subjects are numbered in the order of their names."""
-        subject_names = {r.name.rpartition("_")[0]: r.subject for r in reaches}
+        session_names = [reach.name.rpartition("_")[0] or reach.subject for reach in reaches]
+        subject_names = {name: reach.subject for name, reach in zip(session_names, reaches, strict=True)}
         sessions, names = sorted(subject_names), sorted(set(subject_names.values()))
         subjects = np.array([names.index(subject_names[session]) for session in sessions])
-        session = np.array([sessions.index(r.name.rpartition("_")[0]) for r in reaches])
+        session = np.array([sessions.index(name) for name in session_names])
         ring, angle = np.array([r.ring for r in reaches]), np.array([r.angle for r in reaches])
         return cls(session, subjects[session], ring, angle, subjects)
 
