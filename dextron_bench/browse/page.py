@@ -51,7 +51,8 @@ def _style() -> Html:
 
 def _facts(episodes: pd.DataFrame) -> Html:
     counts = {"episodes": len(episodes), "runs": episodes["run"].nunique(), "methods": episodes["method"].nunique()}
-    return join(*(tag("li", tag("b", _grouped(number)), " ", name) for name, number in counts.items()))
+    words = ((number, name if number != 1 else name.removesuffix("s")) for name, number in counts.items())
+    return join(*(tag("li", tag("b", _grouped(number)), " ", name) for number, name in words))
 
 
 def _controls(search: Search) -> Html:

@@ -24,13 +24,27 @@ ORDERS = {  # Name of each order, with its column and whether the lowest values 
 DEFAULT = next(iter(ORDERS))
 
 
+class UnknownOrder(ValueError):
+    """No order of episodes has this name."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"there is no order {name!r}; choose from {', '.join(map(repr, ORDERS))}")
+
+
 @dataclass(frozen=True, slots=True)
 class Search:
-    """An expression that episodes match (all if it is empty), their order, and the number of the page from 1 on."""
+    """An expression that episodes match (all if it is empty), their order, and the number of the page from 1 on.
+
+    Raises UnknownOrder.
+    """
 
     where: str = ""
     order: str = DEFAULT
     page: int = 1
+
+    def __post_init__(self) -> None:
+        if self.order not in ORDERS:
+            raise UnknownOrder(self.order)
 
     @classmethod
     def of(cls, query: Mapping[str, str]) -> Self:

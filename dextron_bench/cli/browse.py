@@ -39,6 +39,8 @@ class Browse:
 
     Example: dextron-bench browse runs/rlil-0.1 --where "cause == 'too late' and subject == '04' and return < 5"
 
+    Example: dextron-bench browse --web --where "not success and split == 'val'" --order "worst first"
+
     Example: dextron-bench browse --where "not success and split == 'hard'" --json
     """
 
@@ -46,6 +48,8 @@ class Browse:
     """Folders of runs."""
     where: str = ""
     """The expression that the page starts with; docs/recordings.md lists the columns."""
+    order: str = "as played"
+    """The order that the page starts with, such as "worst first"."""
     web: bool = False
     """Open recordings in the browser; no screen and no GPU is needed here."""
     port: int = 8766
@@ -60,8 +64,8 @@ class Browse:
 
         if not self.json and not self.web:
             _check_screen()
+        search = Search(self.where, self.order)
         episodes = episode_catalogue.read(self.place)
-        search = Search(self.where)
         matching = search.matching(episodes)  # Raises BadExpression before anything is served.
         if self.json:
             rows = matching[list(episode_catalogue.COLUMNS)].to_dict("records")

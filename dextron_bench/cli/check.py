@@ -60,6 +60,14 @@ class Check:
         if self.json:
             print_json([{"what": check.what, "verdict": check.verdict, "found": check.detail} for check in results])
         else:
-            ready = f"ready: dextron-bench submit {shlex.quote(self.agent)} --name NAME"
-            print(f"{len(failed)} to fix" if failed else ready)
+            print(f"{len(failed)} to fix" if failed else f"ready: {self.submission()}")
         return DIFFERS if failed else DONE
+
+    def submission(self) -> str:
+        """The command that submits what was checked."""
+        words = ["dextron-bench", "submit", self.agent]
+        words += ["--settings", self.settings] if self.settings != Check.settings else []
+        words += ["--weights", str(self.weights)] if self.weights else []
+        words += ["--reaches", self.reaches] if self.reaches != Check.reaches else []
+        words += ["--trust"] if self.trust else []
+        return f"{shlex.join(words)} --name NAME"

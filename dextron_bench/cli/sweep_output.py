@@ -39,6 +39,7 @@ def print_trials(file: SweepFile, content: Mapping[str, Any], trials: list[Trial
 def print_winner(content: Mapping[str, Any], trials: list[Trial], runs: Path) -> None:
     """Prints the winner, how it was chosen, and the command that plays it on the splits that rank."""
     from dextron_bench.methods import registry
+    from dextron_bench.sweeps.trial import STARTED
 
     if content["winner"] is None:
         print("no trial is done, so there is no winner")
@@ -47,7 +48,8 @@ def print_winner(content: Mapping[str, Any], trials: list[Trial], runs: Path) ->
     words = [content["flags"], *(registry.as_flag(name, value) for name, value in winner.settings.items())]
     words += ["--reaches", question["reaches"], "--seed", *map(str, question["seeds"])]
     words += [] if runs == Path("runs") else ["--runs", str(runs)]
-    print(f"winner: {winner.run}, with {in_words(winner)}\n{content['choice']}")
+    title = "best so far" if any(trial.state == STARTED for trial in trials) else "winner"
+    print(f"{title}: {winner.run}, with {in_words(winner)}\n{content['choice']}")
     print(f"On the splits that rank: dextron-bench run {' '.join(words)}")
 
 

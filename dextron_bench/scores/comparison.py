@@ -157,9 +157,10 @@ def align(
 def _seed_scores(name: str, results: Results, reaches: str, split: str) -> SeedScores:
     seeds = [result for result in results if result["reaches"] == reaches]
     if without_split := [result for result in seeds if split not in result["splits"]]:
+        advice = "; other seeds have it: to compare one of them, give its folder" if without_split != seeds else ""
         raise Incomparable(
             f"{name}, seed {without_split[0]['seed']}, has no split {split!r} of {reaches} reaches; "
-            f"it has {_sorted_list(without_split[0]['splits'])}"
+            f"it has {_sorted_list(without_split[0]['splits'])}{advice}"
         )
     splits = [result["splits"][split] for result in seeds]
     if len({(result["digest"], len(result["scores"])) for result in splits}) > 1:

@@ -45,6 +45,11 @@ def test_the_address_has_the_expression(
     assert printed.out.endswith("/?where=return+%3C+5\n")
     port = printed.out.split(":")[2].split("/")[0]
     assert f"ssh -N -L {port}:127.0.0.1:{port} HOST" in printed.err
+    assert main.main(["browse", "--web", "--port", "0", "--order", "worst first"]) == 0
+    assert capsys.readouterr().out.endswith("/?order=worst+first\n")
+    assert "no order 'worst'; choose from 'as played', 'worst first'" in complaint(
+        "browse", "--json", "--order", "worst"
+    )
     assert "cannot read 'return <'" in complaint("browse", "--web", "--where", "return <")
 
 

@@ -187,6 +187,8 @@ def test_an_impossible_comparison_is_one_line_on_stderr(here: Path, complaint: C
     write(here / "runs", "short", [0.0] * 3)
     write(here / "runs", "uneven", [0.0] * ROWS)
     write(here / "runs", "uneven", [0.0] * ROWS, seed=1, digest="b" * 64)
+    write(here / "runs", "more", [0.0] * ROWS)
+    write(here / "runs", "more", [0.0] * ROWS, seed=1, split="val")
     for folder in ("both", "too"):
         write(here / "runs", folder, [0.0])
         write(here / "runs", folder, [0.0], reaches="synthetic")
@@ -200,6 +202,7 @@ def test_an_impossible_comparison_is_one_line_on_stderr(here: Path, complaint: C
         ("both", "too"): "both have results on real, synthetic reaches; choose one with --reaches",
         ("good", "bad", "--reaches", "minjerk"): "both have results on real reaches, but not both on minjerk reaches",
         ("good", "bad", "--split", "val"): "good, seed 0, has no split 'val' of real reaches; it has test",
+        ("good", "more"): "it has val; other seeds have it: to compare one of them, give its folder",
         ("good", "bad", "--into", "difference.gif"): "no picture format '.gif'",
         ("good",): "required",
         ("good", "bad", "short"): "played different versions of test of real reaches",

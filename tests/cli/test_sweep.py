@@ -92,7 +92,15 @@ def test_the_best_of_a_grid_is_chosen_on_val_alone(here: Path, capsys: pytest.Ca
     assert main.main(["sweep", "--show"]) == 0
     assert "nearness" in capsys.readouterr().out
     assert main.main(["sweep", "--show", "--name", "nearness"]) == 3
-    assert command in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert command in printed
+    assert "winner: mine-near" in printed
+    file = here / "runs/sweeps/nearness/sweep.json"
+    under_way = json.loads(file.read_text())
+    under_way["trials"][2] |= {"state": "started"}
+    file.write_text(json.dumps(under_way))
+    assert main.main(["sweep", "--show", "--name", "nearness"]) == 3
+    assert "best so far: mine-near" in capsys.readouterr().out
 
 
 def test_the_scores_are_drawn_against_the_setting(here: Path, monkeypatch: pytest.MonkeyPatch):

@@ -5,9 +5,11 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 from types import ModuleType
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
+import torch
 
 from dextron_bench.methods.isolation import policy_files
 from tests.helpers import tiny_benchmark, tiny_training
@@ -61,4 +63,53 @@ def test_a_training_with_stable_baselines_ends_as_a_bundle(
     assert board.main(name="sac", trust=True) == 0
     assert (tmp_path / "sac-synthetic.zip").exists()
     assert "sac-synthetic.zip: verify it with" in capsys.readouterr().out
+    tiny_benchmark.forget()
+
+
+def test_each_row_has_a_queue_and_a_new_episode_empties_only_its_own():
+    """A queue for all rows would hand out the rest of a chunk that was made for the episode before."""
+    board = example("lerobot_to_board")
+    policy = board.ChunkPolicy()
+    chunk = torch.linspace(0.0, 0.7, board.CHUNK)
+    policy.predict_action_chunk = lambda batch: batch["observation.state"][:, :1, None] + chunk[None, :, None]
+    agent = board.PolicyPerRow(policy)
+    agent.reset(np.arange(2))
+    states = np.zeros((2, 48))
+    np.testing.assert_allclose(agent.act(states), [[0.0], [0.0]], atol=1e-6)
+    np.testing.assert_allclose(agent.act(states), [[0.1], [0.1]], atol=1e-6)
+    agent.reset(np.array([1]))
+    np.testing.assert_allclose(agent.act(states - 0.5), [[0.2], [-0.5]], atol=1e-6)
+
+
+def test_the_loss_leaves_out_the_padding_of_a_chunk():
+    board = example("lerobot_to_board")
+    policy = board.ChunkPolicy()
+    policy.predict_action_chunk = lambda batch: torch.zeros(1, board.CHUNK, 1)
+    actions = torch.tensor([0.25, 0.75, *[9.0] * (board.CHUNK - 2)])[None, :, None]
+    padding = torch.tensor([False, False, *[True] * (board.CHUNK - 2)])[None]
+    batch = {board.OBSERVATION: torch.zeros(1, 48), board.ACTION: actions, board.PADDING: padding}
+    assert policy(batch).item() == 0.5
+
+
+@pytest.mark.slow
+def test_a_lerobot_style_policy_ends_as_a_bundle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """In the tiny world, after 20 updates."""
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    monkeypatch.chdir(tmp_path)
+    board = example("lerobot_to_board")
+    data = board.demonstrations("synthetic", episodes=2)
+    ends = data[board.PADDING][:, 1].nonzero()[:, 0]  # Only the last step of an episode has no next one.
+    assert len(ends) == 2
+    first, second = data[board.ACTION][1:, 0], data[board.ACTION][:-1, 1]
+    assert torch.equal(first[~data[board.PADDING][:-1, 1]], second[~data[board.PADDING][:-1, 1]])
+    trained = board.train(data, steps=20)
+    assert trained(data) < board.train(data, steps=0)(data)
+    assert board.main(name="ours", episodes=2, steps=20) == 0
+    printed = capsys.readouterr().out
+    assert "half of the episodes, in another order, get bit-equal actions" in printed
+    assert "ours-synthetic.zip: verify it with" in printed
+    with ZipFile(tmp_path / "ours-synthetic.zip") as bundle:
+        assert any(name.endswith("ours.safetensors") for name in bundle.namelist())
     tiny_benchmark.forget()
