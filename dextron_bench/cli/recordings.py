@@ -26,8 +26,6 @@ COLUMNS = {"method": "method", "reaches": "reaches", "seed": "seed", "split": "s
 class List(EpisodeFlags):
     """List recordings with their properties. If some are damaged, print a line for each and exit with code 1.
 
-    The cause of an episode is known for recordings in the folder of their run.
-
     Example: dextron-bench recordings list runs/exp/synthetic/seed0 --check
 
     Example: dextron-bench recordings list --method reflex --cause "too late" --worst 5

@@ -1,4 +1,4 @@
-"""Recordings as a table of episodes, with the causes that the tables of their runs hold."""
+"""Recordings as a table of episodes, with causes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,12 @@ def select(summaries: Sequence[Summary], episode_filter: EpisodeFilter) -> list[
 
 
 def cause(summary: Summary) -> str | None:
-    """Why the episode ended as it did, if the recording lies in the folder of its run; raises DamagedFile."""
+    """Why the episode ended as it did; raises DamagedFile.
+
+    Recordings of version 0.1 do not say it: for them it is known in the folder of their run only.
+    """
+    if isinstance(stated := summary.properties.get("cause"), str):
+        return stated
     run, place = RunFolder(summary.file.parent.parent), (summary.properties.get("split"), summary.properties.get("row"))
     return _causes(run, run.episodes.stat().st_mtime_ns).get(place) if run.episodes.exists() else None
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from dextron_bench.evaluation import diagnosis
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.experts.policies import Case
@@ -37,11 +38,12 @@ def record(folder: RunFolder, source: Source, split: Split, row: int, episode: E
 def write(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> str:
     """Writes the recording of an episode, with what the shipped success model predicts; returns its SHA-256.
 
-    `about` names method, source of reaches and seed.
+    `about` names method, source of reaches and seed. The recording also says why the episode ended as it did.
     """
     from dextron_bench import recording  # Loads Rerun, which evaluation alone does not need.
 
-    properties = {**about, "split": split.name, "split_digest": split.digest, "row": row}
+    cause = diagnosis.diagnose(episode, split.cases[row]).cause
+    properties = {**about, "split": split.name, "split_digest": split.digest, "row": row, "cause": cause}
     properties["physics"] = model.mjcf_hash()
     file, path = folder.recording(split.name, row), source.path(episode.setting)
     return recording.write(file, episode, path, properties, _predictions(source, split.cases[row], episode))

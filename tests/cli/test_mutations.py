@@ -34,7 +34,7 @@ from tests.helpers.toy_learner import ToyTrainer
 
 COUNT, THOROUGH = 20, 300  # Mutations of each kind of file.
 LONGEST = 30  # [s] that a command may take.
-MOST_MEMORY = 2**30  # Bytes by which the memory of this process, or of a process that it starts, may grow.
+MOST_MEMORY = 2**30  # Bytes; the memory of this process, and of all that it starts, may grow by so much.
 TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--no-floors", "--record", "0"]
 RUN = ["run", *TOY]
 BUILD = ["leaderboard", "build", "--runs", "runs", "--into", "board"]

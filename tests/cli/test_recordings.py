@@ -58,6 +58,8 @@ def test_recordings_are_selected_in_the_words_of_view(
     assert listed("--cause", "solved", "--row", "1") == [("exp", 1, "solved")]
     assert listed("--worst", "1") == episodes[2:3]
     assert listed("--best", "1") == episodes[:1]
+    shutil.copytree("runs/nothing/synthetic/seed0/recordings", "elsewhere")
+    assert listed("elsewhere") == episodes[2:]  # Without the table of the run.
     assert "no episode has method 'bc'; choose from exp, nothing" in complaint("recordings", "list", "--method", "bc")
 
 

@@ -29,8 +29,8 @@ class RecordingCheck:
         self._summaries = dict(self._screened(claims["seed"], report))
         self.problems: list[str] = []
 
-    def check(self, split: str, row: int, episode: Episode) -> None:
-        """Compares the recording of a row, if there is one, with its episode."""
+    def check(self, split: str, row: int, episode: Episode, cause: str) -> None:
+        """Compares the recording of a row, if there is one, with its episode and the cause in the row."""
         if not (summary := self._summaries.get((split, row))):
             return
         try:
@@ -42,6 +42,7 @@ class RecordingCheck:
         if not _is_same(recorded.episode, episode, self._tolerance):
             self.problems.append(f"recordings/{name} does not hold the episode that its actions give")
         expected = {**self._claims, "split": split, "row": row}
+        expected |= {"cause": cause} if "cause" in recorded.properties else {}  # Not in recordings of version 0.1.
         if differing := [key for key, value in expected.items() if recorded.properties.get(key) != value]:
             key = differing[0]
             self.problems.append(f"recordings/{name} says {key} {recorded.properties.get(key)}, not {expected[key]}")

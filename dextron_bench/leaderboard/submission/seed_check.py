@@ -117,10 +117,11 @@ class SeedCheck:
         self, table: pd.DataFrame, recordings: RecordingCheck, threads: int, report: Progress
     ) -> replay_check.Replayed:
         """Plays all rows again; keeps the hash of each episode and checks its recording."""
+        causes = dict(zip(zip(table["split"], table["row"], strict=True), table["cause"], strict=True))
 
         def observe(split: str, row: int, episode: Episode) -> None:
             self._traces[split, row] = fingerprint(episode)
-            recordings.check(split, row, episode)
+            recordings.check(split, row, episode, causes[split, row])
 
         def replaying(done: int, total: int, note: str = "") -> None:
             report(done, total, f"seed {self._seed}, replaying")

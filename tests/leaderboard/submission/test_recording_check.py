@@ -35,6 +35,18 @@ def test_a_recording_under_another_name_is_refused(forged: Forgery):
     assert "test-0900.rrd belongs to no row of the splits" in forged.checked().problems[0]
 
 
+def test_another_cause_is_refused_and_an_old_recording_without_one_is_not(forged: Forgery):
+    file = forged.seed / "recordings" / "test-0000.rrd"
+    recorded = recording.read(file)
+    path = sources.open_source(tiny_benchmark.NAME).path(recorded.episode.setting)
+    assert recorded.properties["cause"] != "slipped"
+    recording.write(file, recorded.episode, path, {**recorded.properties, "cause": "slipped"})
+    assert "recordings/test-0000.rrd says cause slipped, not" in forged.checked().problems[0]
+    others = {name: value for name, value in recorded.properties.items() if name != "cause"}
+    recording.write(file, recorded.episode, path, others)
+    assert forged.checked().problems == []
+
+
 def test_a_damaged_recording_is_refused(forged: Forgery):
     file = forged.seed / "recordings" / "test-0000.rrd"
     file.write_bytes(file.read_bytes()[:-100])
