@@ -57,6 +57,7 @@ BASELINES_ALSO = {  # Private modules that baselines import, and why an outside 
     "reaches.rotation": "features of poses; SciPy has rotations too",
     "reaches.setting": "the type of a source",
     "reaches.timing": "the duration of a control step",
+    "reaches.synthetic.fitted": "STOPPING learns from new reaches of a model of `train`",
     "reaches.sources": "names of the sources for which weights can ship",
     "storage.atomic": "the caches of demonstrations and openings",
     "storage.hashing": "the cache of demonstrations, and the hash of a success model",

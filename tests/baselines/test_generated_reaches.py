@@ -9,6 +9,7 @@ from baselines import generated_reaches
 from dextron_bench.reaches.reach import palm_centre
 from dextron_bench.reaches.setting import OFFSET, ReachSource, Setting
 from dextron_bench.reaches.sources import open_source
+from dextron_bench.reaches.synthetic.fitted import TooFewRegions
 from dextron_bench.reaches.synthetic.fitting import Groups
 from dextron_bench.reaches.synthetic.generator import open_synthetic
 from tests.helpers.short_reaches import SETTINGS, SOURCE
@@ -83,8 +84,8 @@ def test_reaches_without_sessions_in_their_names_are_grouped_by_subject():
     assert [subjects[k] for k in groups.subject] == [SYNTHETIC.stratum(name).subject for name in SOME]
 
 
-def test_too_few_start_regions_are_named_with_what_to_do():
-    with pytest.raises(generated_reaches.NoModel, match="too few for a model; use --generated 0"):
+def test_too_few_start_regions_are_named():
+    with pytest.raises(TooFewRegions, match="too few for a model"):
         generated_reaches.generate(SOURCE, SETTINGS, 3)
-    with pytest.raises(generated_reaches.NoModel, match="start in 0 of 16 regions"):
+    with pytest.raises(TooFewRegions, match="start in 0 of 16 regions"):
         generated_reaches.generate(open_source("minjerk"), SETTINGS, 3)
