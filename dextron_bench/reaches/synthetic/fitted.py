@@ -19,7 +19,7 @@ class TooFewRegions(ValueError):
     """Reaches that leave out a start region, so that no model can be fitted to them."""
 
     def __init__(self, regions: int) -> None:
-        super().__init__(f"the reaches start in {regions} of {REGIONS} regions, too few for a model; give reaches from all")
+        super().__init__(f"the reaches start in {regions} of {REGIONS} regions, too few for a model of reaches")
 
 
 def generate(reaches: Sequence[Reach], count: int) -> ReachSource:
