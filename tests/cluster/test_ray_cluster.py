@@ -68,8 +68,13 @@ def test_pieces_of_a_lost_node_are_played_again(
     assert "1 pieces were done again, because their node was lost" in capsys.readouterr().err
 
 
-def test_a_training_and_a_search_go_on_when_their_nodes_are_lost(here: Path, monkeypatch: pytest.MonkeyPatch):
-    """The training loses the node of its third task, which goes on from the checkpoint of the second."""
+def test_a_training_and_a_search_go_on_when_their_nodes_are_lost(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """The training loses the node of its third task, which goes on from the checkpoint of the second.
+
+    The search loses the node of its first block, which is all that it needs.
+    """
     training = (*RUN[:2], TOY, *RUN[3:], "--preset", "quick", "--split", "val", "--seed", "0", "3", "--record", "0")
     search = ("mc", "--rows", "2", "--quiet", "--threads", "1")
     monkeypatch.setattr(trainings, "SECONDS", 0.0)
@@ -79,9 +84,10 @@ def test_a_training_and_a_search_go_on_when_their_nodes_are_lost(here: Path, mon
         with tiny_cluster.losing_a_node(cluster, here, "toy-0.1/synthetic/training-0+3", nth=3) as lost:
             play(*training, "--cluster", "auto")
         shutil.rmtree(here / "lost")
-        with tiny_cluster.losing_a_node(cluster, here, "block 000001") as lost_too:
+        with tiny_cluster.losing_a_node(cluster, here, "block 000000") as lost_too:
             play(*search, "--runs", "search", "--cluster", "auto")
     assert lost == lost_too == [True]
+    assert capsys.readouterr().err.count("1 pieces were done again, because their node was lost") == 2
     assert tiny_training.contents(here / "runs") == tiny_training.contents(here / "whole")
     files = contents(here / "whole-search")
     assert {name: text for name, text in contents(here / "search").items() if name in files} == files

@@ -100,10 +100,12 @@ def losing_a_node(cluster: Any, folder: Path, name: str, nth: int = 1) -> Iterat
     folder.mkdir()
     (folder / "task.json").write_text(json.dumps({"name": name, "nth": nth}))
     lost: list[bool] = []
+    ended = threading.Event()
 
     def kill() -> None:
         while not (file := folder / "node").exists():
-            time.sleep(0.1)
+            if ended.wait(0.1):
+                return
         identity = file.read_text()
         cluster.remove_node(next(one for one in cluster.list_all_nodes() if one.node_id == identity), False)
         lost.append(True)
@@ -111,7 +113,8 @@ def losing_a_node(cluster: Any, folder: Path, name: str, nth: int = 1) -> Iterat
     thread = threading.Thread(target=kill, daemon=True)
     thread.start()
     yield lost
-    thread.join(timeout=1.0)
+    ended.set()
+    thread.join()
 
 
 def _wait_to_be_killed(task: Task) -> None:
