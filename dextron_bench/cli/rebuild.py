@@ -6,7 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -119,20 +119,24 @@ def _inputs(step: Step) -> str:
 
 
 def _outputs(step: Step) -> dict[str, str]:
-    """The hashes of the files that a step makes, by path."""
-    published = [
-        f"{folder}/{name}" for name in step.publishes for folder in ("leaderboard/results", "baselines/weights")
-    ]
+    """The hashes of the files that a step makes, by path; of published results, without what verifications add."""
+    from dextron_bench.leaderboard import collect
+
+    weights = [f"baselines/weights/{name}/*" for name in step.publishes]
+    curves = [f"leaderboard/results/{name}/*/curve.json" for name in step.publishes]
+    results = [f"leaderboard/results/{name}/*/result.json" for name in step.publishes]
     copied = [place for _, place in step.copies]
-    return _hashes((*step.makes, *copied, *(f"{folder}/*" for folder in published), *(f"{f}/*/*" for f in published)))
+    return _hashes((*step.makes, *copied, *weights, *curves)) | _hashes(results, collect.run_digest)
 
 
-def _hashes(patterns: Iterable[str]) -> dict[str, str]:
+def _hashes(patterns: Iterable[str], digest: Callable[[Path], str] | None = None) -> dict[str, str]:
+    """The hashes of files, by path: of their bytes, or what `digest` returns."""
     from dextron_bench.storage import hashing
     from dextron_bench.storage.folders import visible
 
+    digest = digest or hashing.sha256
     files = {file for pattern in patterns for file in visible(Path(), pattern) if file.is_file()}
-    return {file.as_posix(): hashing.sha256(file) for file in sorted(files)}
+    return {file.as_posix(): digest(file) for file in sorted(files)}
 
 
 def _expanded(word: str) -> Iterator[str]:

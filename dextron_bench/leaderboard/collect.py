@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Collection
 from pathlib import Path
@@ -16,6 +17,7 @@ from dextron_bench.storage import atomic, hashing, provenance, schemas
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
 
+STAMPED = ("tier", "fresh")  # What verifications add to a result.
 RESULTS = "results"  # In the leaderboard's folder: a folder of runs without their large files.
 
 
@@ -27,8 +29,9 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
     """Copies results and curves of finished runs into the leaderboard's folder, and weights beside their methods.
 
     A run is finished if its result holds all rows of all splits that rank methods. Runs with other physics than this
-    version's are left out, and so are others than `only`, if it names labels with a source, such as rl/real. Returns
-    the folders of results that were written; raises NothingToPublish, DamagedFile, UnknownMethod, BadSettings.
+    version's are left out, and so are others than `only`, if it names labels with a source, such as rl/real, and what
+    a learner played on `val`. Returns the folders of results that were written; raises NothingToPublish, DamagedFile,
+    UnknownMethod, BadSettings.
     """
     taken = []
     for run in result_files.finished(runs):
@@ -38,6 +41,8 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
         if provenance.physics_of(result) != model.mjcf_hash() or not _is_complete(result):
             continue
         learner = _installed_learner(run, result)
+        if result.get("training"):  # Its snapshot was chosen on `val`, whose score would flatter it.
+            result = {**result, "splits": {name: split for name, split in result["splits"].items() if name != "val"}}
         if run.curve.exists():
             schemas.read(run.curve, schemas.CURVE)  # What is damaged is not copied.
         copy = RunFolder(board / RESULTS / run.path.relative_to(runs))
@@ -59,6 +64,14 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
     return taken
 
 
+def run_digest(file: Path) -> str:
+    """The hash of a published result without what a verification adds to it: its tier, fresh scores and actions."""
+    result = result_files.read_result(file)
+    splits = {name: {key: split[key] for key in split if key != "actions"} for name, split in result["splits"].items()}
+    kept = {key: result[key] for key in result if key not in STAMPED}
+    return hashing.digest(json.dumps({**kept, "splits": splits}, sort_keys=True).encode())
+
+
 def _is_complete(result: dict[str, Any]) -> bool:
     """True if a result holds all rows of all splits that rank methods, in their present versions."""
     splits = [load_split(result["reaches"], name) for name in ranking_splits(result["reaches"])]
@@ -74,7 +87,7 @@ def _with_tier(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]
     splits = {
         name: split | ({"actions": hashes[name]} if hashes[name] else {}) for name, split in result["splits"].items()
     }
-    kept = {name: before[name] for name in ("tier", "fresh") if name in before}
+    kept = {name: before[name] for name in STAMPED if name in before}
     return {**result, "splits": splits, **kept}
 
 

@@ -12,10 +12,15 @@ import pytest
 
 from dextron_bench.cli import main
 from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.leaderboard import collect
 from dextron_bench.methods import weights
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
 from tests.helpers import tiny_benchmark, tiny_training
+
+TOY = "tests.helpers.toy_learner:Toy"
+FRESH = {"beacon": "b", "submission": "s", "splits": {}}
+QUIET = ("--quiet", "--no-floors", "--record", "0")
 
 
 @pytest.fixture
@@ -26,10 +31,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setattr(
         weights, "shipped_folder", lambda learner, reaches: tmp_path / "shipped" / learner.label / reaches
     )
-    common = ["--quiet", "--no-floors", "--record", "0"]
-    toy = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--seed", "0", "1"]
-    assert main.main(["run", *toy, *common]) == 0
-    assert main.main(["run", "--method", "nothing", *common]) == 0
+    assert main.main(["run", "--method", TOY, "--preset", "quick", "--seed", "0", "1", *QUIET]) == 0
+    assert main.main(["run", "--method", "nothing", *QUIET]) == 0
     yield tmp_path
     tiny_benchmark.forget()
 
@@ -100,6 +103,31 @@ def test_the_tier_stays_until_the_scores_change(here: Path):
     file.write_text(json.dumps(verified))
     assert build("--runs", "runs") == 0
     assert "tier" not in json.loads(file.read_text())
+
+
+def test_val_of_a_learner_is_not_published_because_its_snapshot_was_chosen_there(here: Path):
+    for method in (TOY, "nothing"):
+        words = ["--preset", "quick"] if method == TOY else []
+        assert main.main(["run", "--method", method, *words, "--split", "val", *QUIET]) == 0
+    assert build("--runs", "runs") == 0
+    splits = {
+        label: list(json.loads((here / f"board/results/{label}/synthetic/seed0/result.json").read_text())["splits"])
+        for label in ("toy-0.1", "nothing")
+    }
+    assert splits["toy-0.1"] == ["test", "unseen-reach"]
+    assert sorted(splits["nothing"]) == ["test", "unseen-reach", "val"]
+
+
+def test_what_a_verification_adds_to_a_result_does_not_change_the_hash_of_the_run(here: Path):
+    assert build("--runs", "runs") == 0
+    file = here / "board/results/nothing/synthetic/seed0/result.json"
+    result, digest = json.loads(file.read_text()), collect.run_digest(file)
+    result["splits"]["test"]["actions"] = ["ab", "cd"]
+    file.write_text(json.dumps({**result, "tier": "re-run", "fresh": FRESH}))
+    assert collect.run_digest(file) == digest
+    result["splits"]["test"]["scores"][0] = 20.0
+    file.write_text(json.dumps(result))
+    assert collect.run_digest(file) != digest
 
 
 def test_no_cell_of_the_table_is_a_formula_and_nothing_hidden_is_published(here: Path):
