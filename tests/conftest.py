@@ -13,11 +13,12 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
-from tests.helpers import forged_bundles, tiny_benchmark
+from tests.helpers import forged_bundles, tiny_benchmark, tiny_training
 from tests.helpers.browser import open_browser
 from tests.helpers.small_release import SmallRelease, make_small_release
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes would otherwise take every core.
+os.environ.pop("DEXTRON_DEBUG", None)  # With it, an error is a traceback, not one line.
 
 BESIDE = Path(__file__).parents[2] / "shared" / "data" / "dextron-a101b9e-extracts.zip"
 
@@ -86,6 +87,13 @@ def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
 def tiny_world(tmp_path: Path) -> Iterator[Path]:
     """An empty working folder in the tiny world, whose splits lie in data/."""
     with tiny_benchmark.working_folder(tmp_path):
+        yield tmp_path
+
+
+@pytest.fixture
+def training_world(tmp_path: Path) -> Iterator[Path]:
+    """An empty working folder in the tiny world with rows of `train`, for methods that learn."""
+    with tiny_training.working_folder(tmp_path):
         yield tmp_path
 
 

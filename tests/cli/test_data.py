@@ -178,7 +178,6 @@ def test_every_error_has_its_exit_code(
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.delenv("DEXTRON_DEBUG", raising=False)
     monkeypatch.setattr(recorded_cache, "import_release", fail)
     assert main.main(["data", "import", "--from", "x"]) == code
     assert capsys.readouterr().err.startswith(f"dextron-bench: {line}")

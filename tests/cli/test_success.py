@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +12,15 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.storage import tensors
 from dextron_bench.success import generation, training
-from tests.helpers import tiny_benchmark, tiny_training
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder in the tiny world, with small blocks."""
-    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.setattr(generation.DatasetConfig.__init__, "__defaults__", ("synthetic", 0, (), 5))
     monkeypatch.setattr(training.TrainingConfig.__init__, "__defaults__", (30, 2, 8, 1e-3, 100, 0))
     monkeypatch.setattr("baselines.bc.STEPS", 2)
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    tiny_benchmark.forget()
+    return training_world
 
 
 def test_a_data_set_with_policies_and_a_model_trained_on_it(here: Path, capsys: pytest.CaptureFixture[str]):

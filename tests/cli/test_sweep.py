@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +43,10 @@ SOLVES = f"{tiny_benchmark.SOLVED[0][5]:.7f}"  # The critical distance of the ex
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(training_world: Path) -> Path:
     """A folder with an agent in a file, in the tiny world with training."""
-    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.py").write_text(AGENT)
-    yield tmp_path
-    tiny_benchmark.forget()
+    (training_world / "mine.py").write_text(AGENT)
+    return training_world
 
 
 def sweep(*words: str, method: str = "mine.py:Mine") -> list[str]:

@@ -7,7 +7,6 @@ import random
 import shutil
 import signal
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +21,9 @@ FAST = ["--split", "test", "--seed", "0", "1", "--quiet", "--record", "0"]
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(training_world: Path) -> Path:
     """An empty working folder in the tiny world."""
-    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    tiny_benchmark.forget()
+    return training_world
 
 
 def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,6 @@ from dextron_bench.reaches.setting import Setting
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import hashing
 from dextron_bench.world.gym import GraspEnv
-from tests.helpers import tiny_benchmark, tiny_training
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 minari = pytest.importorskip("minari", reason="Minari is not installed: pip install -e '.[minari]'")
@@ -168,13 +167,10 @@ def fit(x: torch.Tensor, y: torch.Tensor) -> torch.nn.Module:
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty working folder with the tiny benchmark installed."""
-    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
     monkeypatch.setattr("baselines.bc.STEPS", 2)
-    monkeypatch.chdir(tmp_path)
-    yield tmp_path
-    tiny_benchmark.forget()
+    return training_world
 
 
 def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from dextron_bench.experts.policies import Case
 from dextron_bench.methods.learners import Learner, Track
@@ -44,6 +46,14 @@ def install(folder: Path, put: Callable[[object, str, object], None]) -> None:
     """Replaces the shipped splits and sources; `put` sets attributes, as `setattr` does."""
     tiny_benchmark.install(folder, put)
     put(sources, "SOURCES", {**sources.SOURCES, "minjerk": lambda: SOURCE})
+
+
+@contextmanager
+def working_folder(folder: Path) -> Iterator[Path]:
+    """Makes a folder the working folder of the tiny benchmark with training, which it keeps in data/."""
+    with tiny_benchmark.working_folder(folder), pytest.MonkeyPatch.context() as patch:
+        install(write(folder / "data"), patch.setattr)
+        yield folder
 
 
 def contents(folder: Path) -> dict[str, bytes]:

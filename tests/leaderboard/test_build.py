@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -16,7 +16,6 @@ from dextron_bench.leaderboard import collect
 from dextron_bench.methods import weights
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
-from tests.helpers import tiny_benchmark, tiny_training
 
 TOY = "tests.helpers.toy_learner:Toy"
 FRESH = {"beacon": "b", "submission": "s", "splits": {}}
@@ -24,17 +23,14 @@ QUIET = ("--quiet", "--no-floors", "--record", "0")
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder on the tiny benchmark, with runs of the toy learner (two seeds) and of `nothing`."""
-    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        weights, "shipped_folder", lambda learner, reaches: tmp_path / "shipped" / learner.label / reaches
+        weights, "shipped_folder", lambda learner, reaches: training_world / "shipped" / learner.label / reaches
     )
     assert main.main(["run", "--method", TOY, "--preset", "quick", "--seed", "0", "1", *QUIET]) == 0
     assert main.main(["run", "--method", "nothing", *QUIET]) == 0
-    yield tmp_path
-    tiny_benchmark.forget()
+    return training_world
 
 
 def build(*words: str) -> int:

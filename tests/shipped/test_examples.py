@@ -12,7 +12,6 @@ import pytest
 import torch
 
 from dextron_bench.methods.isolation import policy_files
-from tests.helpers import tiny_benchmark, tiny_training
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -46,24 +45,23 @@ def test_sac_of_stable_baselines(capsys: pytest.CaptureFixture[str]):
 
 @pytest.mark.slow
 def test_a_training_with_stable_baselines_ends_as_a_bundle(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    training_world: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     """In the tiny world, after 40 steps."""
     pytest.importorskip("stable_baselines3")
-    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
     board = example("sb3_to_board")
     agent = board.train("synthetic", 40)
-    board.save(agent, tmp_path / "sac.pt")
+    board.save(agent, training_world / "sac.pt")
     states = np.random.default_rng(0).normal(size=(5, 48)).astype(np.float32)
     np.testing.assert_allclose(
-        policy_files.load(tmp_path / "sac.pt").act(states), agent.predict(states, deterministic=True)[0], atol=1e-6
+        policy_files.load(training_world / "sac.pt").act(states),
+        agent.predict(states, deterministic=True)[0],
+        atol=1e-6,
     )
     monkeypatch.setattr(board, "train", lambda reaches, steps: agent)
     assert board.main(name="sac", trust=True) == 0
-    assert (tmp_path / "sac-synthetic.zip").exists()
+    assert (training_world / "sac-synthetic.zip").exists()
     assert "sac-synthetic.zip: verify it with" in capsys.readouterr().out
-    tiny_benchmark.forget()
 
 
 def test_each_row_has_a_queue_and_a_new_episode_empties_only_its_own():
@@ -92,12 +90,8 @@ def test_the_loss_leaves_out_the_padding_of_a_chunk():
 
 
 @pytest.mark.slow
-def test_a_lerobot_style_policy_ends_as_a_bundle(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_a_lerobot_style_policy_ends_as_a_bundle(training_world: Path, capsys: pytest.CaptureFixture[str]):
     """In the tiny world, after 20 updates."""
-    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
     board = example("lerobot_to_board")
     data = board.demonstrations("synthetic", episodes=2)
     ends = data[board.PADDING][:, 1].nonzero()[:, 0]  # Only the last step of an episode has no next one.
@@ -110,6 +104,5 @@ def test_a_lerobot_style_policy_ends_as_a_bundle(
     printed = capsys.readouterr().out
     assert "half of the episodes, in another order, get bit-equal actions" in printed
     assert "ours-synthetic.zip: verify it with" in printed
-    with ZipFile(tmp_path / "ours-synthetic.zip") as bundle:
+    with ZipFile(training_world / "ours-synthetic.zip") as bundle:
         assert any(name.endswith("ours.safetensors") for name in bundle.namelist())
-    tiny_benchmark.forget()
