@@ -149,3 +149,24 @@ def test_weights_with_a_flipped_bit_are_neither_used_nor_published(here: Path, c
     file.write_bytes(content)
     assert "it is not the file that the result names" in complaint(*BUILD)
     assert "differ from the digest that it carries" in complaint(*AGAIN)
+
+
+@pytest.mark.parametrize("name", ["episodes.parquet", "result.json", "config.json"])
+def test_a_damaged_run_is_one_line_with_the_file(tiny_world: Path, complaint: Callable[..., str], name: str):
+    words = ["run", "--method", "nothing", "--split", "open", "--no-floors", "--quiet"]
+    assert main.main(words) == 0
+    file = tiny_world / "runs" / "nothing" / "synthetic" / "seed0" / name
+    file.write_bytes(file.read_bytes()[:20])
+    line = complaint(*(["leaderboard", "show"] if name == "result.json" else words))
+    assert f"runs/nothing/synthetic/seed0/{name} is damaged" in line
+    assert "remove it and run again" in line
+    file.unlink()
+    if name != "config.json":
+        assert main.main(words) == 0  # As the line said.
+
+
+def test_a_damaged_split_is_one_line(tiny_world: Path, complaint: Callable[..., str]):
+    file = tiny_world / "data" / "splits-synthetic.parquet"
+    file.write_bytes(file.read_bytes()[:100])
+    assert "reinstall the package" in complaint("run", "--method", "nothing", "--split", "test", "--quiet")
+    assert "reinstall the package" in complaint("list")

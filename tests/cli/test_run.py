@@ -1,60 +1,39 @@
-"""Methods with training, from the command line: flags, files, weights, and one line for each error.
-
-Long, because `run` and `eval` are tried on the same trained toys.
-"""
+"""Methods with training, from the command line: flags, files, labels, and one line for each error."""
 
 from __future__ import annotations
 
 import json
-import pickle
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import torch
-from safetensors.numpy import save_file
 
 from dextron_bench.cli import main
 from dextron_bench.methods import loading
 from dextron_bench.runs import result_files
 from dextron_bench.storage import hashing, tensors
-from dextron_bench.world import model
-from tests.helpers import tiny_benchmark, tiny_training, toy_learner
+from tests.helpers import tiny_training
 from tests.helpers.tiny_training import MINJERK_TOY, TOY, TRANSFER
 
-SHAPE = model.STATE
 FAST = ("--quiet", "--no-floors", "--record", "0")
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty working folder in the tiny world."""
-    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("DEXTRON_DEBUG", raising=False)
-    yield tmp_path
-    tiny_benchmark.forget()
+def here(training_world: Path) -> Path:
+    return training_world
 
 
 def run(spec: str, *words: str) -> list[str]:
     return ["run", "--method", spec, *FAST, "--split", "test", "--preset", "smoke", *words]
 
 
-def evaluate(*words: str) -> list[str]:
-    return ["eval", "--method", TOY, "--quiet", "--split", "test", *words]
-
-
-def rows(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
-    capsys.readouterr()
-    assert main.main([*words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_a_run_trains_all_seeds_together(here: Path, capsys: pytest.CaptureFixture[str]):
-    (row,) = rows(capsys, *run(TOY, "--seed", "0", "1", "--rate", "0.3"))
+def test_a_run_trains_all_seeds_together(
+    here: Path, printed_json: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+):
+    (row,) = printed_json(*run(TOY, "--seed", "0", "1", "--rate", "0.3"))
     assert (row["method"], row["seeds"], row["episodes"]) == ("toy-0.3", 2, 4)
     base = here / "runs" / "toy-0.3" / "synthetic"
     assert sorted(path.name for path in base.iterdir()) == ["seed0", "seed1", "training-0+1"]
@@ -67,24 +46,26 @@ def test_a_run_trains_all_seeds_together(here: Path, capsys: pytest.CaptureFixtu
     assert "toy-0.3" in capsys.readouterr().out
 
 
-def test_seeds_that_are_trained_are_not_trained_again(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_seeds_that_are_trained_are_not_trained_again(here: Path, printed_json: Callable[..., Any]):
     assert main.main(run(TOY, "--seed", "1")) == 0
     before = tiny_training.contents(here / "runs" / "toy-0.1" / "synthetic" / "seed1")
-    (row,) = rows(capsys, *run(TOY, "--seed", "0", "1", "2"))
+    (row,) = printed_json(*run(TOY, "--seed", "0", "1", "2"))
     assert row["seeds"] == 3
     base = here / "runs" / "toy-0.1" / "synthetic"
     assert sorted(path.name for path in base.glob("training-*")) == ["training-0+2", "training-1"]
     assert tiny_training.contents(base / "seed1") == before
 
 
-def test_a_policy_transfer_acts_with_the_weights_of_its_source_policy(here: Path, capsys: pytest.CaptureFixture[str]):
-    (row,) = rows(capsys, *run(TRANSFER))
+def test_a_policy_transfer_acts_with_the_weights_of_its_source_policy(
+    here: Path, printed_json: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+):
+    (row,) = printed_json(*run(TRANSFER))
     assert (row["method"], row["reaches"]) == ("toy-transfer", "synthetic")
     source_policy = here / "runs" / "minjerk-toy-0.1" / "minjerk" / "seed0"
-    heir = here / "runs" / "toy-transfer" / "synthetic" / "seed0"
-    assert (source_policy / "weights.safetensors").read_bytes() == (heir / "weights.safetensors").read_bytes()
-    assert json.loads((heir / "result.json").read_text())["training"]["label"] == "minjerk-toy-0.1"
-    table = rows(capsys, *run(MINJERK_TOY), "--floors")
+    transfer = here / "runs" / "toy-transfer" / "synthetic" / "seed0"
+    assert (source_policy / "weights.safetensors").read_bytes() == (transfer / "weights.safetensors").read_bytes()
+    assert json.loads((transfer / "result.json").read_text())["training"]["label"] == "minjerk-toy-0.1"
+    table = printed_json(*run(MINJERK_TOY), "--floors")
     assert {row["method"]: row["reaches"] for row in table} == dict.fromkeys(
         ("minjerk-toy-0.1", "nothing", "random"), "minjerk"
     )
@@ -94,22 +75,24 @@ def test_a_policy_transfer_acts_with_the_weights_of_its_source_policy(here: Path
     assert "holds a run with other weights" in capsys.readouterr().err
 
 
-def test_a_dry_run_prints_what_is_left_and_writes_nothing(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_dry_run_prints_what_is_left_and_writes_nothing(
+    here: Path, printed_json: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+):
     words = [*run(TOY, "--seed", "0", "1"), "--dry-run"]
-    train, play = rows(capsys, *words)
+    train, play = printed_json(*words)
     assert (train["what"], train["left"], train["seeds"]) == ("train", "2 of 2 epochs", [0, 1])
     assert 0 < train["seconds"] < 60
     assert (play["what"], play["left"]) == ("evaluate", "4 episodes")
     assert 0 < play["seconds"] < 60
     assert not (here / "runs").exists()
     assert main.main([*run(TOY, "--breaks", "2", "--every", "1")]) == 2
-    train, _ = rows(capsys, *run(TOY, "--breaks", "2", "--every", "1"), "--dry-run")
+    train, _ = printed_json(*run(TOY, "--breaks", "2", "--every", "1"), "--dry-run")
     assert train["left"] == "1 of 2 epochs"
     assert main.main(["list"]) == 0
     assert "1 of 2 epochs" in capsys.readouterr().out
     assert main.main(words[:-1]) == 2  # The folder has a run with other settings.
     assert main.main([*run(TOY, "--runs", "other")]) == 0
-    assert rows(capsys, *run(TOY, "--runs", "other"), "--dry-run") == []
+    assert printed_json(*run(TOY, "--runs", "other"), "--dry-run") == []
     assert main.main([*run(TOY, "--runs", "other"), "--dry-run"]) == 0
 
 
@@ -195,7 +178,7 @@ def test_published_rows_of_the_same_splits_and_physics_stand_beside_the_new_ones
 
 
 def test_every_configuration_has_a_folder_and_a_row(
-    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    here: Path, printed_json: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ):
     """Two settings, and then another version of the file: four runs side by side, and each is read again."""
     text = ODD.format(field="near: float = 0.1").replace(
@@ -206,7 +189,7 @@ def test_every_configuration_has_a_folder_and_a_row(
         for name in [name for name in sys.modules if name.startswith(loading.PREFIX)]:
             monkeypatch.delitem(sys.modules, name)  # A new process would load the file again.
         words = ["run", "--method", "odd.py:Odd", *flags, "--no-floors", "--record", "0", "--split", "test", "--quiet"]
-        return [row["method"] for row in rows(capsys, *words)]
+        return [row["method"] for row in printed_json(*words)]
 
     (here / "odd.py").write_text(text)
     assert labels() + labels("--near", "0.2") + labels() == ["odd", "odd-near0.2", "odd"]
@@ -215,93 +198,18 @@ def test_every_configuration_has_a_folder_and_a_row(
     assert labels() + labels("--near", "0.2") + labels() == [f"odd+{digest}", f"odd-near0.2+{digest}", f"odd+{digest}"]
     (here / "odd.py").write_text(text)
     assert labels() == ["odd"]
-    assert len(rows(capsys, "leaderboard", "show")) == 4
+    assert len(printed_json("leaderboard", "show")) == 4
 
 
-def test_tracks_are_rows_beside_the_plain_ones(here: Path, capsys: pytest.CaptureFixture[str]):
+def test_tracks_are_rows_beside_the_plain_ones(
+    here: Path, printed_json: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+):
     words = ["run", "--method", "exp", *FAST, "--split", "test"]
-    by_split = {row["split"]: row["return"] for row in rows(capsys, *words, "--track", "delay-40", "sensing-2")}
+    by_split = {row["split"]: row["return"] for row in printed_json(*words, "--track", "delay-40", "sensing-2")}
     assert by_split.keys() == {"test", "test+delay-40", "test+sensing-2"}
     assert by_split["test"] == 20.0
-    assert [row["split"] for row in rows(capsys, *words)] == ["test"]
-    assert len(rows(capsys, "leaderboard", "show")) == 3
+    assert [row["split"] for row in printed_json(*words)] == ["test"]
+    assert len(printed_json("leaderboard", "show")) == 3
     capsys.readouterr()
     assert main.main([*words, "--track", "nix"]) == 2
     assert "no track 'nix'; choose from delay-40" in capsys.readouterr().err
-
-
-def test_weights_of_a_file_give_the_row_of_its_run(here: Path, capsys: pytest.CaptureFixture[str]):
-    trained = rows(capsys, *run(TOY, "--seed", "4"))
-    file = here / "runs" / "toy-0.1" / "synthetic" / "seed4" / "weights.safetensors"
-    assert rows(capsys, *evaluate("--weights", str(file))) == trained
-    assert (here / "runs" / "eval" / "toy-0.1" / "synthetic" / "seed4" / "result.json").exists()
-    assert len(rows(capsys, "leaderboard", "show")) == 1  # Evaluations of weights do not count.
-
-
-def test_weights_that_ship_lie_beside_the_method(
-    here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
-):
-    (here / "toy.py").write_text(Path(toy_learner.__file__).read_text())
-    words = ["eval", "--method", "toy.py:Toy", "--quiet", "--split", "test"]
-    assert (
-        "no weights of 'toy-0.2' on synthetic reaches ship for seed 0; train them with `dextron-bench run --method "
-        "toy.py:Toy --rate 0.2 --reaches synthetic --seed 0`"
-    ) in complaint(*words, "--rate", "0.2")
-    trained = rows(capsys, *run("toy.py:Toy", "--seed", "0", "2"))
-    for seed in (0, 2):
-        place = here / "weights" / "toy-0.1" / "synthetic" / f"seed{seed}.safetensors"
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_bytes((here / f"runs/toy-0.1/synthetic/seed{seed}/weights.safetensors").read_bytes())
-    assert rows(capsys, *words) == trained
-    assert "ship for seed 1; train them" in complaint(*words, "--seed", "0", "1")
-    assert "--rate 0.2 --reaches synthetic --seed 0`, or use weights that ship: toy-0.1" in complaint(
-        *words, "--rate", "0.2"
-    )
-
-
-def damaged(folder: Path, kind: str) -> Path:
-    """A broken file of weights."""
-    file, good = folder / f"{kind}.safetensors", {"map": np.zeros(SHAPE), "offset": np.zeros(())}
-    writers: dict[str, Callable[[], object]] = {
-        "missing": lambda: None,
-        "empty": lambda: file.write_bytes(b""),
-        "pickle": lambda: file.write_bytes(pickle.dumps(good)),
-        "header": lambda: file.write_bytes(b"\xff" * 8 + b"{}"),
-        "nested": lambda: file.write_bytes((200000).to_bytes(8, "little") + b"[" * 200000),
-        "cut": lambda: (save_file(good, file), file.write_bytes(file.read_bytes()[:-8])),
-        "shape": lambda: save_file(good | {"map": np.zeros(3)}, file),
-        "names": lambda: save_file({"other": np.zeros(3)}, file),
-        "nan": lambda: save_file(good | {"map": np.full(SHAPE, np.nan)}, file),
-        "other": lambda: tensors.write(file, good, {"label": "bc"}),
-        "folder": file.mkdir,
-    }
-    writers[kind]()
-    return file
-
-
-@pytest.mark.parametrize(
-    ("kind", "expected"),
-    [
-        ("missing", "No such file or directory: missing.safetensors"),
-        ("empty", "empty.safetensors is damaged or not a safetensors file"),
-        ("pickle", "pickle.safetensors is damaged or not a safetensors file"),
-        ("header", "header.safetensors is damaged or not a safetensors file"),
-        ("nested", "nested.safetensors is damaged or not a safetensors file"),
-        ("cut", "cut.safetensors is damaged or not a safetensors file"),
-        ("shape", "shape.safetensors holds no weights that fit 'toy-0.1' (ValueError: matmul"),
-        ("names", "names.safetensors holds no weights that fit 'toy-0.1' (KeyError: 'map')"),
-        ("nan", "nan.safetensors holds numbers in 'map' that are not finite"),
-        ("other", "other.safetensors holds weights of 'bc', not of 'toy-0.1'"),
-        ("folder", "folder.safetensors"),
-    ],
-)
-def test_a_broken_file_of_weights_is_one_line(here: Path, complaint: Callable[..., str], kind: str, expected: str):
-    assert expected in complaint(*evaluate("--weights", damaged(here, kind).name))
-    assert not (here / "runs").exists()
-
-
-def test_an_impossible_evaluation_is_one_line(here: Path, complaint: Callable[..., str]):
-    assert "method 'exp' has no weights" in complaint("eval", "--method", "exp")
-    file = damaged(here, "other").name
-    assert "method 'exp' has no weights" in complaint("eval", "--method", "exp", "--weights", file)
-    assert "give one --seed, or none" in complaint(*evaluate("--weights", file, "--seed", "0", "1"))
