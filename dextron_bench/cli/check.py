@@ -64,10 +64,10 @@ class Check:
         return DIFFERS if failed else DONE
 
     def submission(self) -> str:
-        """The command that submits what was checked."""
+        """The command that submits what was checked, with each flag of both commands that is not the default."""
         words = ["dextron-bench", "submit", self.agent]
-        words += ["--settings", self.settings] if self.settings != Check.settings else []
-        words += ["--weights", str(self.weights)] if self.weights else []
-        words += ["--reaches", self.reaches] if self.reaches != Check.reaches else []
+        for name in ("reaches", "weights", "settings", "timeout", "memory"):
+            if (value := getattr(self, name)) != getattr(Check, name):
+                words += [f"--{name}", str(value)]
         words += ["--trust"] if self.trust else []
         return f"{shlex.join(words)} --name NAME"

@@ -10,7 +10,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dextron_bench.cli import check as cli_check
 from dextron_bench.cli import main
 from dextron_bench.leaderboard.submission.conformance import MEND, NOTE, OK, Check, checks
 from dextron_bench.methods.isolation.isolated_agent import Limits
@@ -69,15 +68,6 @@ def test_the_template_passes_the_checks_and_its_own_test(tmp_path: Path, capsys:
     assert "ready: dextron-bench submit" in printed
     assert main.main(["new-agent", str(folder)]) == 2
     assert "exists already; name a new folder" in capsys.readouterr().err
-
-
-def test_the_command_that_submits_has_the_settings_and_weights_that_were_checked():
-    checked = cli_check.Check("a.py:A", "real", Path("w.safetensors"), '{"near": 0.1}', trust=True)
-    assert checked.submission() == (
-        "dextron-bench submit a.py:A --settings '{\"near\": 0.1}' --weights w.safetensors --reaches real --trust "
-        "--name NAME"
-    )
-    assert cli_check.Check("a.py:A").submission() == "dextron-bench submit a.py:A --name NAME"
 
 
 def test_random_numbers_without_the_seed_are_a_fault(tmp_path: Path):
