@@ -38,4 +38,4 @@ def connected(address: str, runs: Path, threads: int) -> Iterator[RayCluster]:
     with RayCluster(address, runs, threads) as cluster:
         yield cluster
     if cluster.losses:
-        print_warning(f"{cluster.losses} pieces were done again, because their node was lost")
+        print_warning(f"pieces done again because their node was lost: {cluster.losses}")

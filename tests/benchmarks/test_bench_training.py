@@ -112,13 +112,14 @@ def test_threads(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     track = Track(default_source(), draw_cases(24), tmp_path)
     trainer = rl.trainer(track, range(3), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
     trainer.advance()
-    cores = len(os.sched_getaffinity(0))
+    cores, before = len(os.sched_getaffinity(0)), torch.get_num_threads()
 
     def cycles(threads: int) -> None:
         torch.set_num_threads(threads)
         trainer.advance()
 
     seconds, reference = time_in_turns(benchmark, lambda: cycles(1), lambda: cycles(cores), ROUNDS)
+    torch.set_num_threads(before)
     what = "Cycles of RLIL 0.1 with 3 seeds, products of torch on one thread"
     store_rows(benchmark, Row(what, "/s", 1 / seconds, f"on {cores} threads", 1 / reference, 0.9))
 

@@ -65,7 +65,7 @@ def test_pieces_of_a_lost_node_are_played_again(
         play(*RUN, "--cluster", "auto")
     assert lost == [True]
     assert contents(here / "runs") == contents(here / "whole")
-    assert "1 pieces were done again, because their node was lost" in capsys.readouterr().err
+    assert "pieces done again because their node was lost: 1" in capsys.readouterr().err
 
 
 def test_a_training_and_a_search_go_on_when_their_nodes_are_lost(
@@ -87,7 +87,7 @@ def test_a_training_and_a_search_go_on_when_their_nodes_are_lost(
         with tiny_cluster.losing_a_node(cluster, here, "block 000000") as lost_too:
             play(*search, "--runs", "search", "--cluster", "auto")
     assert lost == lost_too == [True]
-    assert capsys.readouterr().err.count("1 pieces were done again, because their node was lost") == 2
+    assert capsys.readouterr().err.count("pieces done again because their node was lost: 1") == 2
     assert tiny_training.contents(here / "runs") == tiny_training.contents(here / "whole")
     files = contents(here / "whole-search")
     assert {name: text for name, text in contents(here / "search").items() if name in files} == files

@@ -112,9 +112,11 @@ def losing_a_node(cluster: Any, folder: Path, name: str, nth: int = 1) -> Iterat
 
     thread = threading.Thread(target=kill, daemon=True)
     thread.start()
-    yield lost
-    ended.set()
-    thread.join()
+    try:
+        yield lost
+    finally:
+        ended.set()
+        thread.join()
 
 
 def _wait_to_be_killed(task: Task) -> None:
