@@ -115,7 +115,9 @@ def _row(name: str, means: tuple[float, float], decision: Decision, unit: float)
 
 def _effort(side: ScoresInOrder, split: Split) -> str:
     """How many episodes a method began, and how many that saved."""
-    seeds = f"{side.seeds} seed" + ("s" if side.seeds > 1 else "")
+    from dextron_bench.scores import cells
+
+    seeds = cells.counted(side.seeds, "seed")
     if side.is_stored:
         return f"stored results of {seeds}, nothing was played"
     failed = f"; {side.failed} failed" if side.failed else ""

@@ -52,7 +52,7 @@ class Plan:
 
     def __call__(self) -> int:
         from dextron_bench.runs import result_files
-        from dextron_bench.scores import comparison, paired, planning
+        from dextron_bench.scores import cells, comparison, paired, planning
         from dextron_bench.world import task
 
         if self.difference <= 0.0 or min(self.seeds) < 2:
@@ -70,7 +70,7 @@ class Plan:
         title = f"to show a difference of {self.difference:g} {unit} between {a.name} and {b.name}"
         rows = [[plan.seeds, *(TOO_MANY if n is None else n for n in (plan.settings, plan.episodes))] for plan in plans]
         print_table(f"{title}, {a.split} of {a.reaches} reaches", ["seeds", "settings", "episodes"], rows)
-        counts = f"{len(a.scores)} seed{'s' * (len(a.scores) > 1)} of {a.name} and {len(b.scores)} of {b.name}"
+        counts = f"{cells.counted(len(a.scores), 'seed')} of {a.name} and {len(b.scores)} of {b.name}"
         print(f"made from {counts} on {a.scores.shape[1]} settings, which show {present:.2f} {unit}")
         print(f"standard deviation between settings {noise.settings**0.5:.2f}, between seeds {_listed(noise.seeds)}")
         return DONE

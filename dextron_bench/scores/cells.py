@@ -25,6 +25,11 @@ class Score:
         return f"{self.value} {self.interval}".rstrip()
 
 
+def counted(number: int, noun: str) -> str:
+    """A number with its noun, such as "1 seed" and "3 seeds"."""
+    return f"{number} {noun}" + ("s" if number != 1 else "")
+
+
 def rank(row: Row) -> str:
     """The rank, as a whole number."""
     return _number(row.get("rank"), 0)

@@ -20,6 +20,10 @@ def test_a_score_is_its_mean_with_its_interval():
     assert (cells.rank(ROW), cells.regret(ROW), cells.closing_lag(ROW)) == ("3", "2.04", "-0.00")
 
 
+def test_one_has_no_plural():
+    assert [cells.counted(number, "seed") for number in (0, 1, 3)] == ["0 seeds", "1 seed", "3 seeds"]
+
+
 def test_an_unknown_interval_is_left_out():
     assert str(cells.interquartile_mean(ROW)) == "18.00"
 

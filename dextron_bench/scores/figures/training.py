@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
+from dextron_bench.scores.cells import counted
 from dextron_bench.scores.figures.pictures import check_format, save
 
 
@@ -25,8 +26,7 @@ def learning_curves(
     for index, (label, seeds) in enumerate(sorted(curves.items())):
         table = pd.concat([points.set_index("epoch")["return"] for points in seeds.values()], axis=1)
         mean, colour = table.mean(axis=1), f"C{index}"
-        count = f"{len(seeds)} seed{'s' if len(seeds) > 1 else ''}"
-        axes.plot(table.index, mean, color=colour, label=f"{label} ({count})", linewidth=1.5)
+        axes.plot(table.index, mean, color=colour, label=f"{label} ({counted(len(seeds), 'seed')})", linewidth=1.5)
         axes.fill_between(table.index, table.min(axis=1), table.max(axis=1), color=colour, alpha=0.15, linewidth=0)
     constant = rows[(rows["split"] == "test") & ~rows["method"].isin(list(curves))]
     for index, row in enumerate(constant.to_dict("records"), start=len(curves)):
