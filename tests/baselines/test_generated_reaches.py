@@ -10,7 +10,6 @@ from dextron_bench.reaches.reach import palm_centre
 from dextron_bench.reaches.setting import OFFSET, ReachSource, Setting
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.reaches.synthetic.fitted import TooFewRegions
-from dextron_bench.reaches.synthetic.fitting import Groups
 from dextron_bench.reaches.synthetic.generator import open_synthetic
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
@@ -75,13 +74,6 @@ def test_the_heading_is_the_horizontal_direction_from_the_carrier_to_the_palm():
     at = np.searchsorted(reach.times, reach.reached)
     ahead = palm_centre(reach.positions, reach.quaternions)[at] - reach.positions[at]
     assert generated_reaches._heading(reach) == pytest.approx(np.arctan2(ahead[1], ahead[0]), abs=0.35)
-
-
-def test_reaches_without_sessions_in_their_names_are_grouped_by_subject():
-    groups = Groups.from_reaches([SYNTHETIC.reach(name) for name in SOME])
-    subjects = sorted({SYNTHETIC.stratum(name).subject for name in SOME})
-    assert len(groups.subjects) == len(subjects)
-    assert [subjects[k] for k in groups.subject] == [SYNTHETIC.stratum(name).subject for name in SOME]
 
 
 def test_too_few_start_regions_are_named():
