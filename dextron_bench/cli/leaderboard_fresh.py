@@ -49,7 +49,7 @@ class Fresh:
 
         rows = [row for row in verify_board.rows(self.board, self.method, [reaches]) if not row.run.episodes.exists()]
         with progress_bar(f"fresh settings of {reaches} reaches", self.quiet) as progress:
-            fresh, splits = fresh_baselines.settings_of_board(
+            fresh, splits = fresh_baselines.load_or_draw(
                 self.board, reaches, self.beacon, self.rows, self.threads, progress
             )
         for row in rows:

@@ -24,13 +24,14 @@ from dextron_bench.world import model
 FOLDER = "fresh"  # In the leaderboard's folder: the fresh settings of all baselines, a table for each source.
 
 
-def settings_of_board(
+def load_or_draw(
     board: Path, reaches: str, beacon: str = "", rows: int = 0, threads: int = 0, report: Progress = no_progress
 ) -> tuple[FreshSettings, list[Split]]:
-    """The fresh settings of a board's baselines on a source: the stored ones, or new ones if these are others.
+    """The fresh settings of a board's baselines on a source: the stored ones, or newly drawn ones, which are stored.
 
-    Baselines have no bundle: the hash of the physics takes the place of its hash. Without a beacon, the stored settings
-    are right if they are of the same physics. Raises DamagedFile.
+    Stored settings are used if they are of the present physics, and of the beacon and the number of rows for each split
+    if these are given. Baselines have no bundle: the hash of the physics replaces its hash. Raises DamagedFile, and the
+    errors of `FreshSettings.draw`.
     """
     physics, stored = model.mjcf_hash(), stored_settings(board, reaches)
     if stored is not None:

@@ -117,7 +117,7 @@ class SeedCheck:
         self, table: pd.DataFrame, recordings: RecordingCheck, threads: int, report: Progress
     ) -> replay_check.Replayed:
         """Plays all rows again; keeps the hash of each episode and checks its recording."""
-        causes = dict(zip(zip(table["split"], table["row"], strict=True), table["cause"], strict=True))
+        causes = table.set_index(["split", "row"])["cause"].to_dict()
 
         def observe(split: str, row: int, episode: Episode) -> None:
             self._traces[split, row] = fingerprint(episode)
