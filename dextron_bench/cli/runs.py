@@ -13,30 +13,13 @@ import tyro
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.leaderboard import none_for_nan
 from dextron_bench.cli.output import print_json, print_table
+from dextron_bench.runs.search import RunFilter
 
 if TYPE_CHECKING:
     from dextron_bench.runs.catalogue import Entry
 
 COLUMNS = ("run", "state", "seeds", "val", "return", "success", "date", "tags", "note")
 SETTINGS = "settings."  # Begins the name of a column with a setting.
-
-
-@dataclass(frozen=True)
-class Filter:
-    """Which runs; an option that is not given selects all."""
-
-    method: str = ""
-    """A pattern of labels, such as "rlil*"."""
-    reaches: str = ""
-    """The source of reaches."""
-    setting: tuple[str, ...] = ()
-    """Settings with their values, such as near=0.06."""
-    tag: tuple[str, ...] = ()
-    """Tags that a run must have."""
-    since: str = ""
-    """A date, such as 2026-01-31: only runs that changed since."""
-    state: str = ""
-    """The beginning of a state: done, training, stopped, unfinished, failed."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +31,7 @@ class List:
 
     runs: Path = Path("runs")
     """Folder of all runs."""
-    filter: Annotated[Filter, tyro.conf.arg(name="")] = field(default_factory=Filter)
+    filter: Annotated[RunFilter, tyro.conf.arg(name="")] = field(default_factory=RunFilter)
     split: str = "test"
     """The split of the columns `return` and `success`."""
     sort: Literal["name", "date", "return", "success"] = "name"
@@ -63,8 +46,7 @@ class List:
     def __call__(self) -> int:
         from dextron_bench.runs import catalogue, search
 
-        chosen = search.RunFilter(**vars(self.filter))
-        entries = search.ordered(filter(chosen.passes, catalogue.entries(self.runs)), self.sort, self.split)
+        entries = search.ordered(filter(self.filter.passes, catalogue.entries(self.runs)), self.sort, self.split)
         rows = [{name: _cell(entry, name, self.split) for name in self.columns} for entry in entries]
         if self.json:
             print_json(rows)
@@ -121,7 +103,7 @@ class Best:
 
     runs: Path = Path("runs")
     """Folder of all runs."""
-    filter: Annotated[Filter, tyro.conf.arg(name="")] = field(default_factory=Filter)
+    filter: Annotated[RunFilter, tyro.conf.arg(name="")] = field(default_factory=RunFilter)
     split: str = "val"
     """The split; on `val`, a run that has not played it counts with the best point of its learning curves."""
     json: bool = False
@@ -130,8 +112,7 @@ class Best:
     def __call__(self) -> int:
         from dextron_bench.runs import catalogue, search
 
-        chosen = search.RunFilter(**vars(self.filter))
-        entries = search.ordered(filter(chosen.passes, catalogue.entries(self.runs)), "return", self.split)
+        entries = search.ordered(filter(self.filter.passes, catalogue.entries(self.runs)), "return", self.split)
         if not entries or entries[0].score(self.split) != entries[0].score(self.split):
             raise search.BadSearch(f"none of the {len(entries)} runs has a score on {self.split!r}")
         best = entries[0]

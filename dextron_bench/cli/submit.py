@@ -75,6 +75,7 @@ class Submit:
     def __call__(self) -> int:
         from dextron_bench.leaderboard.submission import playing
         from dextron_bench.methods.isolation.isolated_agent import Limits
+        from dextron_bench.scores import cells
 
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
@@ -94,7 +95,7 @@ class Submit:
         print_rows(self._standings(folder), as_json=False)
         failures = playing.failures(folder, entry.seeds)
         for why, count in failures.items():
-            print(f"{count} episodes failed: {why}")
+            print(f"{cells.counted(count, 'episode')} failed: {why}")
         print(
             f"{file}: verify it with `dextron-bench leaderboard verify {file}`, then send it in (docs/leaderboard.md)"
         )

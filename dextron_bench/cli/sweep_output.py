@@ -71,10 +71,11 @@ def draw(content: Mapping[str, Any], trials: list[Trial], file: Path) -> None:
 
 def _state(trial: Trial) -> str:
     """The state of a trial, with its error, and the number of episodes in which the agent raised one."""
+    from dextron_bench.scores import cells
     from dextron_bench.sweeps.trial import STOPPED
 
     state = f"{trial.state} at epoch {max(trial.points)}" if trial.state == STOPPED else trial.state
-    state += f" ({trial.failed} episodes failed)" if trial.failed else ""
+    state += f" ({cells.counted(trial.failed, 'episode')} failed)" if trial.failed else ""
     return f"{state}: {trial.error}" if trial.error else state
 
 

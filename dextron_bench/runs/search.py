@@ -7,8 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
 
-from dextron_bench.runs.catalogue import Entry
+if TYPE_CHECKING:
+    from dextron_bench.runs.catalogue import Entry
 
 SCORES = ("return", "success")
 ORDERS = ("name", "date", *SCORES)
@@ -20,18 +22,20 @@ class BadSearch(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class RunFilter:
-    """Selects runs; an empty entry selects all. Raises BadSearch.
-
-    `method` is a pattern of labels, such as "rlil*". `setting` are texts such as "near=0.06". `since` is a date such as
-    "2026-01-31". `state` is the beginning of a state, such as "done" or "failed".
-    """
+    """Which runs; an option that is not given selects all. Raises BadSearch."""
 
     method: str = ""
+    """A pattern of labels, such as "rlil*"."""
     reaches: str = ""
+    """The source of reaches."""
     setting: tuple[str, ...] = ()
+    """Settings with their values, such as near=0.06."""
     tag: tuple[str, ...] = ()
+    """Tags that a run must have."""
     since: str = ""
+    """A date, such as 2026-01-31: only runs that changed since."""
     state: str = ""
+    """The beginning of a state: done, training, stopped, unfinished, failed."""
 
     def __post_init__(self) -> None:
         for text in self.setting:

@@ -14,6 +14,7 @@ from dextron_bench.methods.agents import AgentCrashed, AgentError
 from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent, Limits
 from dextron_bench.methods.isolation.launch import Launch
 from dextron_bench.reaches import sources
+from dextron_bench.scores import cells
 from dextron_bench.splits.loading import load_split
 from dextron_bench.world import model
 
@@ -66,7 +67,7 @@ def _play(launch: Launch, reaches: str, limits: Limits, threads: int) -> list[Ep
 
 def _form_check(episodes: Sequence[Episode]) -> Check:
     if failures := [episode.failure for episode in episodes if episode.failure]:
-        return Check(FORM, MEND, f"{len(failures)} episodes failed: {failures[0]}")
+        return Check(FORM, MEND, f"{cells.counted(len(failures), 'episode')} failed: {failures[0]}")
     largest = max(float(np.abs(episode.actions).max()) for episode in episodes)
     return Check(FORM, OK, f"the largest is {largest:.3g}")
 
