@@ -42,7 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"dextron-bench: {broken[0]!a} is not valid UTF-8; rename the file or folder", file=sys.stderr)
         return USAGE
     try:
-        code = _parse(words)()
+        command = _parse(words)
+        usage.check_numbers(command)
+        code = command()
         sys.stdout.flush()
         return code
     except BrokenPipeError:  # The reader of the results has stopped, as `| head` does.

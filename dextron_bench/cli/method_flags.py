@@ -52,6 +52,8 @@ def as_bad_settings(arguments: Sequence[str]) -> Iterator[None]:
     """Turns any error of a method's class into BadSettings while its settings are parsed."""
     try:
         yield
+    except BrokenPipeError:  # The reader of the help has stopped, as `| head` does.
+        raise
     except Exception as error:
         from dextron_bench.methods import registry
 

@@ -14,7 +14,7 @@ from dextron_bench.cli import clusters, shares
 from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.leaderboard import print_rows
 from dextron_bench.cli.method_flags import settings_dict
-from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.cli.output import print_json, print_table, print_warning, progress_bar
 from dextron_bench.reaches.sources import SourceName
 
 TrackerName = Literal["rerun", "tensorboard", "trackio", "wandb"]
@@ -128,8 +128,8 @@ class Run:
         return [[run.with_seed(seed) for seed in dict.fromkeys(self.seed)] for run in runs]
 
     def _execute(self, groups: list[list[plans.Run]]) -> int:
-        from dextron_bench.runs import annotations, execution, result_files
-        from dextron_bench.scores import standings
+        from dextron_bench.runs import annotations, execution, result_files, run_files
+        from dextron_bench.scores import cells, standings
 
         results = []
         for group in groups:
@@ -157,7 +157,13 @@ class Run:
             both = standings.table([*results, *result_files.published_beside(results)])
             both["from"] = both["method"].isin(rows["method"]).map({True: "this run", False: "published"})
             print_rows(both[both["split"].isin(played)])
-        return EPISODES_FAILED if rows["failed"].any() else DONE
+        if not rows["failed"].any():
+            return DONE
+        for group in groups:
+            for why, count in run_files.failures(run.folder(self.runs) for run in group).items():
+                episodes = cells.counted(count, "episode")
+                print_warning(f"{episodes} of {group[0].label} failed: {why}; `dextron-bench check` tests an agent")
+        return EPISODES_FAILED
 
     def _following(self, group: list[plans.Run]) -> AbstractContextManager[None]:
         """Trackers follow the trainings of a group, in processes of their own."""

@@ -98,6 +98,8 @@ class Show:
 class Best:
     """Print the run with the highest mean return on a split, by default `val`, which no ranking uses.
 
+    Experts (`exp`) are left out: they are no entrant, and always best.
+
     Example: dextron-bench runs best --method "mine*" --split val
     """
 
@@ -112,7 +114,8 @@ class Best:
     def __call__(self) -> int:
         from dextron_bench.runs import catalogue, search
 
-        entries = search.ordered(filter(self.filter.passes, catalogue.entries(self.runs)), "return", self.split)
+        entrants = [entry for entry in catalogue.entries(self.runs) if entry.label != "exp"]
+        entries = search.ordered(filter(self.filter.passes, entrants), "return", self.split)
         if not entries or entries[0].score(self.split) != entries[0].score(self.split):
             raise search.BadSearch(f"none of the {len(entries)} runs has a score on {self.split!r}")
         best = entries[0]

@@ -75,7 +75,9 @@ class Submit:
     def __call__(self) -> int:
         from dextron_bench.leaderboard.submission import playing
         from dextron_bench.methods.isolation.isolated_agent import Limits
+        from dextron_bench.runs import run_files
         from dextron_bench.scores import cells
+        from dextron_bench.storage.run_folder import RunFolder
 
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
@@ -93,7 +95,7 @@ class Submit:
             folder = playing.play_entry(entry, self.runs, self.record, limits, self.threads, progress)
         playing.write_bundle(entry, folder, file)
         print_rows(self._standings(folder), as_json=False)
-        failures = playing.failures(folder, entry.seeds)
+        failures = run_files.failures(RunFolder.of_seed(folder, seed) for seed in entry.seeds)
         for why, count in failures.items():
             print(f"{cells.counted(count, 'episode')} failed: {why}")
         print(

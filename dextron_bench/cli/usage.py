@@ -11,8 +11,24 @@ from typing import Any
 
 from dextron_bench.cli.method_flags import FIELD
 
+LARGEST_PORT = 65535
 RULE = "-"  # Separates the parts of tyro's messages.
 UNKNOWN = re.compile(r"Unrecognized (?:or misplaced )?options: ([^\s,;=]+)")
+
+
+class BadNumber(ValueError):
+    """A number that a flag cannot have."""
+
+
+def check_numbers(command: Any) -> None:
+    """Raises BadNumber if a flag that takes whole numbers has a negative one: all of them count something."""
+    for field in dataclasses.fields(command):
+        value = getattr(command, field.name)
+        for number in value if isinstance(value, tuple) else (value,):
+            if isinstance(number, int) and number < 0:
+                raise BadNumber(f"--{field.name.replace('_', '-')} is {number}; it must be 0 or more")
+            if field.name == "port" and number > LARGEST_PORT:
+                raise BadNumber(f"--port is {number}; it must be at most {LARGEST_PORT}")
 
 
 def one_line(box: str) -> str:

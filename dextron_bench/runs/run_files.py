@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -30,6 +30,13 @@ def stored_episodes(folder: RunFolder, splits: Sequence[Split]) -> pd.DataFrame:
 def store_episodes(folder: RunFolder, table: pd.DataFrame) -> None:
     """Replaces the table of episodes of a run."""
     tables.write(folder.episodes, table)
+
+
+def failures(folders: Iterable[RunFolder]) -> dict[str, int]:
+    """The number of failed episodes of runs for each reason."""
+    read = [pd.read_parquet(folder.episodes, columns=["failure"]) for folder in folders]
+    reasons = pd.concat(read)["failure"].str.replace(r" at step \d+$", "", regex=True)
+    return {str(reason): int(count) for reason, count in reasons[reasons != ""].value_counts().items()}
 
 
 def copy_weights(file: Path, folder: RunFolder) -> Path:

@@ -17,6 +17,7 @@ from dextron_bench.scores.statistics import RETURNS, Bounds, Part
 
 NOISE = 3.29  # Standard errors; a difference due to chance exceeds them once in two thousand times.
 SIGNIFICANT = 1.0 - statistics.LEVEL  # The largest p value that counts as a difference.
+FEW = 6  # Settings: fewer of them, all with one sign, happen by chance in more than 5 % (sign test).
 POWER = 0.8  # Chance that a difference of the size `detectable` is significant.
 
 
@@ -58,13 +59,20 @@ def difference(a: np.ndarray, b: np.ndarray, bounds: Bounds = RETURNS, same_sett
     seeds = pooled([*statistics.parts_of_seeds(a), *statistics.parts_of_seeds(b)])
     if same_settings:
         sums = len(a) * b.sum(axis=0) - len(b) * a.sum(axis=0)
-        settings = [statistics.part_of_mean(sums, len(a) * len(b))]
+        settings = [_part_of_few(sums) or statistics.part_of_mean(sums, len(a) * len(b))]
     else:
         settings = [statistics.part_of_settings(a), statistics.part_of_settings(b)]
     parts = [*settings, *seeds]
     mean = float(b.mean() - a.mean())
     estimate = statistics.interval(mean, parts, _bounds_of_difference(bounds))
     return Difference(estimate.mean, estimate.low, estimate.high, detectable(parts), statistics.p_value(mean, parts))
+
+
+def _part_of_few(sums: np.ndarray) -> Part | None:
+    """An infinite part if fewer than FEW settings have the same difference, which says nothing of its spread."""
+    if len(sums) < FEW and sums.any() and (sums == sums[0]).all():
+        return Part(math.inf, max(len(sums) - 1.0, 1.0))
+    return None
 
 
 def _bounds_of_difference(bounds: Bounds) -> Bounds:

@@ -52,7 +52,9 @@ def test_an_agent_that_fails_in_some_episodes_is_code_3_and_other_episodes_count
 ):
     for spoil, failure in (("actions[0] = np.nan", "action is nan"), ("actions[0] = 1.001", "is outside [-1, 1]")):
         assert main.main(run(mine(here, spoil), "--json", "--runs", failure[:9])) == 3
-        (row,) = json.loads(capsys.readouterr().out)
+        printed = capsys.readouterr()
+        (row,) = json.loads(printed.out)
+        assert f"dextron-bench: 1 episode of mine failed: {failure[:6]}" in printed.err
         assert (row["episodes"], row["failed"]) == (2, 1)
         episodes = pd.read_parquet(here / failure[:9] / "mine" / "synthetic" / "seed0" / "episodes.parquet")
         assert failure in episodes["failure"][0]

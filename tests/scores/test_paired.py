@@ -24,9 +24,21 @@ def solved(*rows: str) -> np.ndarray:
 
 
 def test_a_constant_lead_is_certain_even_if_settings_differ_much():
-    a = np.array([[0.0, 5.0, 19.0, 3.0]])
+    a = np.array([[0.0, 5.0, 19.0, 3.0, 7.0, 7.0]])
     result = paired.difference(a, a + 1.0)
     assert (result.mean, result.low, result.high, result.detectable) == pytest.approx((1.0, 1.0, 1.0, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("settings", [1, 2, 5])
+def test_a_constant_lead_on_few_settings_says_nothing(settings: int):
+    """Two settings that A fails and B solves would otherwise have a p value of 0."""
+    result = paired.difference(np.zeros((1, settings)), np.full((1, settings), 20.0))
+    assert (result.mean, result.low, result.high, result.p_value) == (20.0, -20.0, 20.0, 1.0)
+
+
+def test_equal_scores_on_few_settings_are_equal():
+    result = paired.difference(np.ones((1, 2)), np.ones((1, 2)))
+    assert (result.mean, result.low, result.high, result.p_value) == (0.0, 0.0, 0.0, 1.0)
 
 
 def test_the_difference_is_between_means_over_seeds_and_settings():

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.leaderboard.submission import bundle
@@ -86,13 +85,6 @@ def row_order(split: Split, seed: int) -> np.ndarray:
     """The row numbers of a split in the order in which a submission with this seed plays them."""
     digest = hashing.digest(split.digest.encode(), str(seed).encode())
     return np.random.default_rng(int(digest, 16)).permutation(len(split.cases))
-
-
-def failures(folder: Path, seeds: Sequence[int]) -> dict[str, int]:
-    """The number of failed episodes for each reason."""
-    tables = [pd.read_parquet(RunFolder.of_seed(folder, seed).episodes, columns=["failure"]) for seed in seeds]
-    reasons = pd.concat(tables)["failure"].str.replace(r" at step \d+$", "", regex=True)
-    return {str(reason): int(count) for reason, count in reasons[reasons != ""].value_counts().items()}
 
 
 def write_bundle(entry: Entry, folder: Path, file: Path) -> dict[str, Any]:
