@@ -54,7 +54,7 @@ def test_an_agent_that_fails_in_some_episodes_is_code_3_and_other_episodes_count
         assert main.main(run(mine(here, spoil), "--json", "--runs", failure[:9])) == 3
         printed = capsys.readouterr()
         (row,) = json.loads(printed.out)
-        assert f"dextron-bench: 1 episode of mine failed: {failure[:6]}" in printed.err
+        assert "dextron-bench: 1 episode of mine failed: action" in printed.err
         assert (row["episodes"], row["failed"]) == (2, 1)
         episodes = pd.read_parquet(here / failure[:9] / "mine" / "synthetic" / "seed0" / "episodes.parquet")
         assert failure in episodes["failure"][0]
@@ -79,7 +79,10 @@ def test_an_agent_that_cannot_play_is_one_line(here: Path, complaint: Callable[.
 
 
 def test_an_agent_that_cannot_begin_is_one_line(here: Path, complaint: Callable[..., str]):
-    assert "agent(-1) of method 'random' raised ValueError" in complaint(*run("random", "--seed", "-1"))
+    (here / "mine.py").write_text(
+        'class Mine:\n    name = "mine"\n\n    def agent(self, seed):\n        raise ValueError("oh")\n'
+    )
+    assert "raised ValueError: oh" in complaint(*run("mine.py:Mine", "--seed", "4"))
 
 
 def test_a_file_where_the_folder_should_be_is_one_line(here: Path, complaint: Callable[..., str]):

@@ -190,7 +190,7 @@ def test_without_recordings_the_error_says_how_to_get_them(
     assert (printed.out, printed.err.count("\n")) == ("", 1)
     assert "data import --from" in printed.err
     assert main.main(["data", command, "--seed", "-1"]) == 2
-    assert "a seed must be 0 or more" in capsys.readouterr().err
+    assert "--seed is -1; it must be 0 or more" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
