@@ -61,3 +61,8 @@ def test_windows_are_drawn_also_for_settings_that_never_work_and_for_hands_that_
     assert [label.get_text() for label in axes.get_yticklabels()] == ["0", "1", "2"]
     marks = [(line.get_xdata()[0], line.get_markerfacecolor()) for line in axes.lines[:2]]  # type: ignore[index]
     assert marks == [(pytest.approx(0.04), "C0"), (0.0, "white")]
+
+
+def test_a_part_of_a_training_is_not_drawn_beside_the_whole():
+    labels = ["rl-quick", "rl", "rlil-0.1-quick", "exp"]
+    assert training.without_parts(labels) == ["exp", "rl", "rlil-0.1-quick"]

@@ -31,7 +31,7 @@ def curves(by_source: Curves, rows: pd.DataFrame) -> Iterator[Html]:
         source_rows = rows[rows["reaches"] == reaches]
         drawing = pictures.inline(lambda file, args=(methods, source_rows): training.learning_curves(*args, file))
         title = f"Learning curves on {reaches} reaches"
-        label = f"{title}: return on val against epochs for {', '.join(sorted(methods))}"
+        label = f"{title}: return on val against epochs for {', '.join(training.without_parts(methods))}"
         picture = _scrollable(svg.picture(drawing, f"curves-{reaches}", label), title)
         yield tag("figure", picture, tag("figcaption", f"{reaches} reaches"), data_reaches=reaches)
 
