@@ -128,8 +128,7 @@ class Run:
         return [[run.with_seed(seed) for seed in dict.fromkeys(self.seed)] for run in runs]
 
     def _execute(self, groups: list[list[plans.Run]]) -> int:
-        from dextron_bench.runs import annotations, execution, result_files, run_files
-        from dextron_bench.scores import cells, standings
+        from dextron_bench.runs import annotations, execution, result_files
 
         results = []
         for group in groups:
@@ -149,6 +148,16 @@ class Run:
                 if run.plan.record and not self.json:
                     print(f"{folder}: results, provenance and recordings; open one with `dextron-bench view {folder}`")
         played = {name for group in groups for name in group[0].splits}
+        if not self._print(results, played):
+            return DONE
+        self._print_failures(groups)
+        return EPISODES_FAILED
+
+    def _print(self, results: list[dict[str, Any]], played: set[str]) -> bool:
+        """Prints the rows of the played splits, with the published ones beside them; True if an episode failed."""
+        from dextron_bench.runs import result_files
+        from dextron_bench.scores import standings
+
         rows = standings.table(results)
         rows = rows[rows["split"].isin(played)]
         if self.json:
@@ -157,13 +166,17 @@ class Run:
             both = standings.table([*results, *result_files.published_beside(results)])
             both["from"] = both["method"].isin(rows["method"]).map({True: "this run", False: "published"})
             print_rows(both[both["split"].isin(played)])
-        if not rows["failed"].any():
-            return DONE
+        return bool(rows["failed"].any())
+
+    def _print_failures(self, groups: list[list[plans.Run]]) -> None:
+        """Says on stderr why episodes failed, and how many for each reason."""
+        from dextron_bench.runs import run_files
+        from dextron_bench.scores import cells
+
         for group in groups:
             for why, count in run_files.failures(run.folder(self.runs) for run in group).items():
                 episodes = cells.counted(count, "episode")
                 print_warning(f"{episodes} of {group[0].label} failed: {why}; `dextron-bench check` tests an agent")
-        return EPISODES_FAILED
 
     def _following(self, group: list[plans.Run]) -> AbstractContextManager[None]:
         """Trackers follow the trainings of a group, in processes of their own."""

@@ -112,9 +112,10 @@ class Best:
     """Print JSON."""
 
     def __call__(self) -> int:
+        from dextron_bench.methods.registry import CEILINGS
         from dextron_bench.runs import catalogue, search
 
-        entrants = [entry for entry in catalogue.entries(self.runs) if entry.label != "exp"]
+        entrants = [entry for entry in catalogue.entries(self.runs) if entry.label not in CEILINGS]
         entries = search.ordered(filter(self.filter.passes, entrants), "return", self.split)
         if not entries or entries[0].score(self.split) != entries[0].score(self.split):
             raise search.BadSearch(f"none of the {len(entries)} runs has a score on {self.split!r}")

@@ -15,11 +15,14 @@ from tests.helpers.tiny_benchmark import ROWS
 
 CASES: list[Case] = cases_from_frame(ROWS[:3])
 AGENT = """
+import time
+
 import numpy as np
 from dextron_bench.world import task
 
 class Agent:
     name = "mine"
+    rng = np.random.default_rng()
 
     def agent(self, seed):
         return self

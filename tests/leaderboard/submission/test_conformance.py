@@ -15,27 +15,7 @@ from dextron_bench.leaderboard.submission.conformance import MEND, NOTE, OK, Che
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.methods.isolation.launch import prepare_launch
 from tests.helpers import tiny_benchmark
-
-AGENT = """
-import time
-
-import numpy as np
-
-
-class Agent:
-    name = "mine"
-    rng = np.random.default_rng()
-
-    def agent(self, seed):
-        return self
-
-    def reset(self, episodes):
-        pass
-
-    def act(self, states):
-        {act}
-"""
-
+from tests.helpers.isolated_play import write_agent
 
 ROWS = pd.concat(
     [tiny_benchmark.ROWS, tiny_benchmark.ROWS.query("split == 'test'").assign(split="val")], ignore_index=True
@@ -51,10 +31,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def check(tmp_path: Path, act: str) -> dict[str, Check]:
-    (tmp_path / "mine.py").write_text(AGENT.format(act=act))
-    return {
-        check.what: check for check in checks(prepare_launch(f"{tmp_path}/mine.py:Agent"), limits=Limits(answer=20.0))
-    }
+    launch = prepare_launch(write_agent(tmp_path, act))
+    return {check.what: check for check in checks(launch, limits=Limits(answer=20.0))}
 
 
 def test_the_template_passes_the_checks_and_its_own_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
