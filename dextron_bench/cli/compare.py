@@ -32,7 +32,8 @@ class OnlyForTwo(ValueError):
 class Compare:
     """Compare methods on equal settings: how much more B scores than A, with its 95 % interval.
 
-    A and B are names on the leaderboard, found in --runs or else among the published results. They can also be paths:
+    A and B are names on the leaderboard, found in --runs if the split was played there, or else among the published
+    results. They can also be paths:
     a result.json, the folder of a run, or the folder of a method's runs. With three methods or more, the table has
     all pairs, and its p values are corrected for their number. docs/statistics.md explains the numbers.
 
@@ -85,7 +86,7 @@ class Compare:
         if self.others and (self.into is not None or self.fail_if_worse):
             raise OnlyForTwo("--into and --fail-if-worse need two methods, not more")
         names = (self.a, self.b, *self.others)
-        results = [result_files.find(name, self.runs) for name in names]
+        results = [result_files.find(name, self.runs, self.split) for name in names]
         methods = comparison.align_all(names, results, self.split, self.reaches)
         if self.others:
             from dextron_bench.cli import compare_pairs

@@ -10,7 +10,7 @@ import tyro
 
 from dextron_bench.cli import shares
 from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
-from dextron_bench.cli.leaderboard import print_rows
+from dextron_bench.cli.leaderboard import print_beside_published
 from dextron_bench.cli.method_flags import settings_dict
 from dextron_bench.cli.output import progress_bar
 from dextron_bench.reaches.sources import SourceName
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Eval:
-    """Evaluate the shipped weights of a trained method, or the weights in a file, and print its rows.
+    """Evaluate the shipped weights of a method, or the weights in a file, and print them beside the published rows.
 
     The settings of a method are flags too, as for `run`. The files go to the folder `eval` in the folder of runs.
 
@@ -56,7 +56,6 @@ class Eval:
 
     def __call__(self) -> int:
         from dextron_bench.runs import execution, result_files
-        from dextron_bench.scores import standings
 
         share, runs, folder = shares.parse(self.share, self.merge), self._runs(), self.runs / "eval"
         if share is not None or self.merge:
@@ -69,9 +68,7 @@ class Eval:
             with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:
                 execution.execute(run, folder, self.threads, progress)
             results.append(result_files.read_result(run.folder(folder).result))
-        rows = standings.table(results)
-        print_rows(rows[rows["split"].isin(runs[0].splits)], self.json)
-        return EPISODES_FAILED if rows["failed"].any() else DONE
+        return EPISODES_FAILED if print_beside_published(results, runs[0].splits, self.json) else DONE
 
     def _runs(self) -> list[plans.Run]:
         """The runs to evaluate, one for each seed."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from dextron_bench.scores.robustness import Robustness
 
 FRESH = ("fresh [95 %]", "gap [95 %]", "mark")  # Columns of a table in which some row has played fresh settings.
+INTERQUARTILE, REGRET, LAG = "interquartile mean [95 %]", "regret", "closing lag [s]"
+OPTIONAL = (INTERQUARTILE, "gap [95 %]", "fresh [95 %]", REGRET, "episodes", "seeds")  # On a narrow terminal.
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
     if rows.empty:
         print("no results yet; `dextron-bench run --method exp` makes some")
         return
-    columns = ["rank", "method", "return [95 %]", "success % [95 %]", "interquartile mean [95 %]", "regret"]
+    columns = ["rank", "method", "return [95 %]", "success % [95 %]", INTERQUARTILE, REGRET]
     for (reaches, split), group in rows.groupby(["reaches", "split"], sort=False):
         origin = ["from"] if "from" in group else []
         counts = ["seeds", "episodes", *(["failed"] if group["failed"].any() else []), *origin]
@@ -124,7 +126,26 @@ def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
             for row in group.to_dict("records")
         ]
         title = f"{reaches} reaches, split {split}, version {group['version'].iloc[0]}"
-        print_table(title, [*columns, *(FRESH if is_fresh else ()), *counts], lines)
+        print_table(title, [*columns, *(FRESH if is_fresh else ()), *counts], lines, OPTIONAL)
+
+
+def print_beside_published(results: list[dict[str, Any]], played: Collection[str], as_json: bool = False) -> bool:
+    """Prints the rows of splits that were played, with the published rows beside them; True if an episode failed.
+
+    JSON holds the new rows alone.
+    """
+    from dextron_bench.runs import result_files
+    from dextron_bench.scores import standings
+
+    rows = standings.table(results)
+    rows = rows[rows["split"].isin(played)]
+    if as_json:
+        print_rows(rows, as_json=True)
+    else:
+        both = standings.table([*results, *result_files.published_beside(results)]).drop(columns="fresh")
+        both["from"] = both["method"].isin(rows["method"]).map({True: "this run", False: "published"})
+        print_rows(both[both["split"].isin(played)])
+    return bool(rows["failed"].any())
 
 
 def print_endings(rows: pd.DataFrame) -> None:
@@ -135,7 +156,7 @@ def print_endings(rows: pd.DataFrame) -> None:
     for (reaches, split), group in rows.groupby(["reaches", "split"], sort=False):
         lines = [[row["method"], *cells.cause_shares(row), cells.closing_lag(row)] for row in group.to_dict("records")]
         title = f"how episodes end [%]: {reaches} reaches, split {split}"
-        print_table(title, ["method", *CAUSES, "closing lag [s]"], lines)
+        print_table(title, ["method", *CAUSES, LAG], lines, ("agent failed", "never reached", LAG))
 
 
 def print_robustness(results: Iterable[dict[str, Any]]) -> None:

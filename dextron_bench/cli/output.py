@@ -7,32 +7,58 @@ import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dextron_bench.storage.printable import printable, printable_line
 from dextron_bench.storage.progress import Progress, no_progress
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 WIDTH = 1000  # Columns of a table that is not printed on a terminal, so that no cell is folded.
 LINE_PERIOD = 60.0  # [s] between lines of progress where there is no terminal.
 RATE_PERIOD = 300.0  # [s] for the estimate of rate and time left; a block of a search takes up to a minute.
 
 
-def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Prints a table on stdout; columns of numbers are right-aligned."""
+def print_table(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[object]], optional: Sequence[str] = ()
+) -> None:
+    """Prints a table on stdout; columns of numbers are right-aligned.
+
+    On a terminal that is too narrow, `optional` columns are left out, from the first on, and a line names them.
+    """
     from rich.console import Console
-    from rich.table import Table
 
     rows = [list(row) for row in rows]
+    console = Console(width=None if sys.stdout.isatty() else WIDTH, soft_wrap=not sys.stdout.isatty(), markup=False)
+    left_out: list[str] = []
+    while True:
+        shown = [index for index, column in enumerate(columns) if column not in left_out]
+        table = _table(title, [columns[i] for i in shown], [[row[i] for i in shown] for row in rows])
+        droppable = [column for column in optional if column in columns and column not in left_out]
+        if (
+            not droppable
+            or console.measure(table, options=console.options.update(width=WIDTH)).maximum <= console.width
+        ):
+            break
+        left_out.append(droppable[0])
+    with console.capture() as captured:  # Rich would end the process if the reader of a pipe has left.
+        console.print(table)
+    print(captured.get(), end="")
+    if left_out:
+        print(f"a wider terminal also shows: {', '.join(column for column in columns if column in left_out)}")
+
+
+def _table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Table:
+    from rich.table import Table
+
     table = Table(title=title, title_justify="left")
     for index, column in enumerate(columns):
         numbers = all(isinstance(row[index], (int, float)) for row in rows)
         table.add_column(column, justify="right" if numbers else "left", overflow="fold")
     for row in rows:
         table.add_row(*(f"{cell:.3f}" if isinstance(cell, float) else printable(str(cell)) for cell in row))
-    console = Console(width=None if sys.stdout.isatty() else WIDTH, soft_wrap=not sys.stdout.isatty(), markup=False)
-    with console.capture() as captured:  # Rich would end the process if the reader of a pipe has left.
-        console.print(table)
-    print(captured.get(), end="")
+    return table
 
 
 def print_markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -57,8 +57,8 @@ class Plan:
 
         if self.difference <= 0.0 or min(self.seeds) < 2:
             raise BadPlan("--difference must be above 0, and --seeds at least 2: one seed does not show their spread")
-        results = result_files.find(self.a, self.runs), result_files.find(self.b, self.runs)
-        a, b = comparison.align((self.a, self.b), results, self.split, self.reaches)
+        results = [result_files.find(name, self.runs, self.split) for name in (self.a, self.b)]
+        a, b = comparison.align((self.a, self.b), (results[0], results[1]), self.split, self.reaches)
         one, other = (100.0 * (x.scores == task.SUCCESS) if self.measure == "success" else x.scores for x in (a, b))
         noise = planning.noise(one, other)
         plans = planning.plans(noise, self.difference, self.seeds)

@@ -12,7 +12,7 @@ import tyro
 
 from dextron_bench.cli import clusters, shares
 from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
-from dextron_bench.cli.leaderboard import print_rows
+from dextron_bench.cli.leaderboard import print_beside_published
 from dextron_bench.cli.method_flags import settings_dict
 from dextron_bench.cli.output import print_json, print_table, print_warning, progress_bar
 from dextron_bench.reaches.sources import SourceName
@@ -147,26 +147,10 @@ class Run:
                 results.append(result_files.read_result(run.folder(self.runs).result))
                 if run.plan.record and not self.json:
                     print(f"{folder}: results, provenance and recordings; open one with `dextron-bench view {folder}`")
-        played = {name for group in groups for name in group[0].splits}
-        if not self._print(results, played):
+        if not print_beside_published(results, {name for group in groups for name in group[0].splits}, self.json):
             return DONE
         self._print_failures(groups)
         return EPISODES_FAILED
-
-    def _print(self, results: list[dict[str, Any]], played: set[str]) -> bool:
-        """Prints the rows of the played splits, with the published ones beside them; True if an episode failed."""
-        from dextron_bench.runs import result_files
-        from dextron_bench.scores import standings
-
-        rows = standings.table(results)
-        rows = rows[rows["split"].isin(played)]
-        if self.json:
-            print_rows(rows, as_json=True)
-        else:
-            both = standings.table([*results, *result_files.published_beside(results)])
-            both["from"] = both["method"].isin(rows["method"]).map({True: "this run", False: "published"})
-            print_rows(both[both["split"].isin(played)])
-        return bool(rows["failed"].any())
 
     def _print_failures(self, groups: list[list[plans.Run]]) -> None:
         """Says on stderr why episodes failed, and how many for each reason."""

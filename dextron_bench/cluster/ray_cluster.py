@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import os
 import pickle
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout
@@ -28,6 +29,7 @@ SETTINGS = {  # Of Ray, unless the user sets others.
 }
 WAITING = 2.0  # Tasks in the cluster for each that can run, so that no processor waits for the driver.
 PERIOD = 1.0  # [s] at most until nodes that have joined get tasks.
+SETTLING = 2.0  # [s] after a loss: Ray 2.60 can crash if it is left while it hears of a lost node.
 LOSSES = 5  # A piece that has lost so many nodes is given up.
 PERFORM = worker.perform  # What every task calls on its node.
 
@@ -73,6 +75,8 @@ class RayCluster:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         with self._quiet:
+            if self.losses:
+                time.sleep(SETTLING)
             self._ray.shutdown()
 
     def run(self, next_task: Next, done: Done) -> None:

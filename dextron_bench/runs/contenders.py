@@ -40,7 +40,7 @@ def _stored(name: str, split: Split, runs: Path) -> np.ndarray | None:
     if name.endswith(weights.SUFFIX):
         return None
     try:
-        results = result_files.find(name, runs)
+        results = result_files.find(name, runs, split.name)
     except result_files.UnknownResult:
         return None
     scores = [

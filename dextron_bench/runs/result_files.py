@@ -87,13 +87,14 @@ def published_beside(new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     ]
 
 
-def find(name: str, runs: Path) -> Results:
+def find(name: str, runs: Path, split: str = "") -> Results:
     """The results of one method by its label in `runs` and, for sources that it has not played there, as published.
 
-    If neither place has any, the name is a path: a `result.json`, a run's folder, or the folder of a method's runs.
+    With a split, a source counts as played if a run there has played that split. If neither place has any result, the
+    name is a path: a `result.json`, a run's folder, or the folder of a method's runs.
     Raises UnknownResult, DamagedFile.
     """
-    results = [read_result(file) for file in _files(name, runs)]
+    results = [read_result(file) for file in _files(name, runs, split)]
     if not results:
         raise UnknownResult(
             f"no result of {name!r}: {runs} has {_labels(runs)}, and published results are "
@@ -104,14 +105,15 @@ def find(name: str, runs: Path) -> Results:
     return results
 
 
-def _files(name: str, runs: Path) -> list[Path]:
+def _files(name: str, runs: Path, split: str) -> list[Path]:
     """The files of a method's results."""
     if NAME.fullmatch(name):
-        mine = finished(runs, name)
-        played = {run.path.parent.name for run in mine}  # Sources of reaches.
-        published = [run for run in finished(published_results(), name) if run.path.parent.name not in played]
-        if mine or published:
-            return [run.result for run in [*mine, *published]]
+        mine, published = finished(runs, name), finished(published_results(), name)
+        played = {_source(run) for run in mine if not split or split in read_result(run.result)["splits"]}
+        instead = [run for run in published if _source(run) not in played]
+        replaced = {_source(run) for run in instead}
+        if mine or instead:
+            return [run.result for run in [*(run for run in mine if _source(run) not in replaced), *instead]]
     path = Path(name)
     if path.is_file():
         return [path]
@@ -121,6 +123,11 @@ def _files(name: str, runs: Path) -> list[Path]:
         [run for place in visible(path, "*") for run in seed_folders(place)],
     )
     return next(filter(None, ([run.result for run in depth if run.result.exists()] for depth in depths)), [])
+
+
+def _source(run: RunFolder) -> str:
+    """The source of reaches that a run's folder is named after."""
+    return run.path.parent.name
 
 
 def _labels(runs: Path) -> str:

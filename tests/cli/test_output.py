@@ -1,7 +1,8 @@
-"""Progress on stderr: what a bar shows, and when no bar appears."""
+"""What commands print: progress on stderr, and tables that fit the terminal."""
 
 from __future__ import annotations
 
+import re
 import sys
 import time
 
@@ -11,7 +12,7 @@ from dextron_bench.cli import output
 
 
 class Terminal:
-    """Replaces a terminal on stderr."""
+    """Replaces a terminal."""
 
     def __init__(self) -> None:
         self.text = ""
@@ -94,3 +95,26 @@ def test_a_warning_is_one_short_line_without_control_characters(capsys: pytest.C
     assert printed.startswith("dextron-bench: runs/\\x1b[2J.rrd: damaged\\nxxx")
     assert printed.endswith("x... and 3023 more characters\n")
     assert printed.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("columns", "names", "line"),
+    [
+        ("60", ["method", "return", "regret", "seeds"], ""),
+        ("30", ["method", "return", "seeds"], "a wider terminal also shows: regret"),
+        ("22", ["method", "return"], "a wider terminal also shows: regret, seeds"),
+    ],
+)
+def test_a_narrow_terminal_leaves_out_optional_columns_and_says_which(
+    columns: str, names: list[str], line: str, monkeypatch: pytest.MonkeyPatch
+):
+    """With its frame, a column takes three characters more than its longest cell, and the table one more."""
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setenv("COLUMNS", columns)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    output.print_table("t", ["method", "return", "regret", "seeds"], [["exp", "20.00", "0.00", 3]], ("regret", "seeds"))
+    heading = next(text for text in terminal.text.splitlines() if "method" in text)
+    assert re.findall("method|return|regret|seeds", heading) == names
+    assert terminal.text.splitlines()[-1].startswith(line or "└")

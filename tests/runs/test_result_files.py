@@ -62,6 +62,16 @@ def test_published_results_stand_in_for_sources_that_were_not_played_here(runs: 
     assert described(result_files.find("rl", runs)) == expected
 
 
+def test_published_results_stand_in_for_splits_that_were_not_played_here(runs: Path):
+    """The published `bc` has `hard` on real reaches; the runs have only `test`."""
+    file = runs.parent / "published/bc/real/seed0/result.json"
+    content = json.loads(file.read_text())
+    file.write_text(json.dumps(content | {"splits": content["splits"] | {"hard": SPLIT}}))
+    assert described(result_files.find("bc", runs, "hard"))[-1] == ("bc", "real", 0, 20.0)
+    mine = [("bc", "real", 0, 2.0), ("bc", "real", 1, 3.0), ("bc", "synthetic", 0, 4.0)]
+    assert described(result_files.find("bc", runs, "test")) == mine
+
+
 def test_a_run_without_a_result_is_not_found(runs: Path):
     (runs / "rl" / "real" / "seed7").mkdir(parents=True)  # The run is not finished.
     assert len(result_files.find("rl", runs)) == 2
