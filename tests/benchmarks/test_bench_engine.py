@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import cache
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -23,6 +26,7 @@ from tests.benchmarks.measure import Row, scaled, store_rows, time_in_turns, tim
 from tests.benchmarks.workload import PreparedSource, default_source, draw_cases
 
 EPISODES, SLOTS, ROUNDS = 192, 96, 3
+PROCESSES = 2
 INPUTS = ("ctrl", "mocap_pos", "mocap_quat")
 
 
@@ -102,6 +106,37 @@ def test_engine_against_bare_physics(benchmark: BenchmarkFixture, threads: int):
     what = f"Control steps: experts through `rollout`, {threads} thread{'s'[: threads - 1]}"
     rates = tape.steps / seconds, tape.steps / bare_seconds
     store_rows(benchmark, Row(what, "steps/s", rates[0], "the same inputs to bare `Batch.step`", rates[1], aim=0.95))
+
+
+def test_processes_against_bare_physics(benchmark: BenchmarkFixture):
+    """Each process plays its half of the episodes on one thread, as the pieces of `--cluster local` do."""
+    count = scaled(EPISODES)
+    drawn_cases = draw_cases(count)
+    tape = record_tape(drawn_cases, PreparedSource(drawn_cases))
+    batch = Batch(model.load(), tape.slots, PROCESSES)
+    parts = [(count, part) for part in range(PROCESSES)]
+    with ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        steps = sum(pool.map(play_part, *zip(*parts, strict=True)))
+        assert steps == tape.steps
+        seconds, bare_seconds = time_in_turns(
+            benchmark, lambda: list(pool.map(play_part, *zip(*parts, strict=True))), lambda: replay(tape, batch), ROUNDS
+        )
+    what = f"Control steps: experts through `rollout`, {PROCESSES} processes of 1 thread"
+    against = f"the same inputs to bare `Batch.step`, {PROCESSES} threads"
+    store_rows(benchmark, Row(what, "steps/s", steps / seconds, against, steps / bare_seconds, aim=0.95))
+
+
+def play_part(count: int, part: int) -> int:
+    """Plays every PROCESSES-th of the drawn cases from number `part` on; returns the number of steps."""
+    cases, source = prepared_part(count, part)
+    return sum(len(episode.actions) for _, episode in play(cases, source, 1))
+
+
+@cache
+def prepared_part(count: int, part: int) -> tuple[list[policies.Case], PreparedSource]:
+    """The cases of a part, with their paths, which are made once in each process."""
+    cases = draw_cases(count)[part::PROCESSES]
+    return cases, PreparedSource(cases)
 
 
 def test_the_bare_physics_does_the_work_of_the_rollout():
