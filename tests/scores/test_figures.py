@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
@@ -66,3 +67,21 @@ def test_windows_are_drawn_also_for_settings_that_never_work_and_for_hands_that_
 def test_a_part_of_a_training_is_not_drawn_beside_the_whole():
     labels = ["rl-quick", "rl", "rlil-0.1-quick", "exp"]
     assert training.without_parts(labels) == ["exp", "rl", "rlil-0.1-quick"]
+
+
+def test_learning_curves_show_the_median_over_seeds_and_each_seed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Of three seeds, one fails from epoch 20 on; `bc` has one seed, and so no panel of its own."""
+    returns = {0: [2.0, 18.0], 1: [4.0, 0.0], 2: [6.0, 16.0]}
+    curves = {
+        "rl": {seed: pd.DataFrame({"epoch": [10, 20], "return": values}) for seed, values in returns.items()},
+        "bc": {0: pd.DataFrame({"epoch": [10, 20], "return": [1.0, 3.0]})},
+    }
+    drawn: list[Figure] = []
+    monkeypatch.setattr(training, "save", lambda figure, file, dpi: drawn.append(figure))
+    rows = pd.DataFrame([{"split": "test", "method": "exp", "return": 20.0}])
+    training.learning_curves(curves, rows, tmp_path / "curves.png")
+    overview, panel = drawn[0].axes
+    assert [np.asarray(line.get_ydata()).tolist() for line in overview.lines[:2]] == [[1.0, 3.0], [4.0, 16.0]]
+    assert overview.get_legend_handles_labels()[1] == ["bc (1 seed)", "rl (3 seeds)", "exp (on test)"]
+    assert panel.get_title() == "rl"
+    assert [np.asarray(line.get_ydata()).tolist() for line in panel.lines] == list(returns.values())

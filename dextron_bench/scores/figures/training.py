@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -12,12 +12,15 @@ from dextron_bench.scores.cells import counted
 from dextron_bench.scores.figures.pictures import check_format, save
 
 PART = "-quick"  # Ends the label of a training with the first fifth of the paper's budget.
+PANELS = 4  # Beside each other: one for each method with several seeds.
+OVERVIEW, PANEL = 5.0, 1.6  # Heights of the axes with all methods, and of a row of panels [inches].
+LIMITS = (0.0, 20.5)
 
 
 def learning_curves(
     curves: dict[str, dict[int, pd.DataFrame]], rows: pd.DataFrame, file: Path, epochs: str = "epochs of 1,000 frames"
 ) -> None:
-    """Draws mean and range over seeds of the return on `val` against epochs (paper, Fig. 4a and 4c).
+    """Draws the return on `val` against epochs (paper, Fig. 4a and 4c): medians over seeds, and below them each seed.
 
     `curves` has a table for each method and seed, with columns `epoch` and `return`. A method in the leaderboard's
     `rows` without curves is a line at its return on `test`. `epochs` is the label of the axis. A method with a part of
@@ -25,21 +28,37 @@ def learning_curves(
     """
     check_format(file)
     drawn = without_parts({*curves, *rows["method"]})
-    figure = Figure(figsize=(8, 5), layout="constrained")
-    axes = figure.add_subplot()
-    for index, (label, seeds) in enumerate((label, curves[label]) for label in drawn if label in curves):
-        table = pd.concat([points.set_index("epoch")["return"] for points in seeds.values()], axis=1)
-        mean, colour = table.mean(axis=1), f"C{index}"
-        axes.plot(table.index, mean, color=colour, label=f"{label} ({counted(len(seeds), 'seed')})", linewidth=1.5)
-        axes.fill_between(table.index, table.min(axis=1), table.max(axis=1), color=colour, alpha=0.15, linewidth=0)
+    tables = {label: _by_seed(curves[label]) for label in drawn if label in curves}
+    colours = {label: f"C{index}" for index, label in enumerate(tables)}
+    with_spread = [label for label, table in tables.items() if table.shape[1] > 1]
+    heights = [OVERVIEW, *[PANEL] * -(-len(with_spread) // PANELS)]
+    figure = Figure(figsize=(8, sum(heights)), layout="constrained")
+    parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    axes = parts[0].subplots()
+    for label, table in tables.items():
+        text = f"{label} ({counted(table.shape[1], 'seed')})"
+        axes.plot(table.index, table.median(axis=1), color=colours[label], label=text, linewidth=1.5)
     constant = rows[(rows["split"] == "test") & rows["method"].isin(set(drawn) - set(curves))]
-    for index, row in enumerate(constant.to_dict("records"), start=len(curves)):
+    for index, row in enumerate(constant.to_dict("records"), start=len(tables)):
         style = ("--", ":", "-.")[index % 3]
         axes.axhline(row["return"], color=f"C{index}", linewidth=1, linestyle=style, label=f"{row['method']} (on test)")
-    axes.set(xlabel=epochs, ylabel="sum of rewards", ylim=(0.0, 20.5), xlim=(0.0, None))
-    axes.set_title("Mean and range over seeds on 50 settings of val")
+    axes.set(xlabel=epochs, ylabel="sum of rewards", ylim=LIMITS, xlim=(0.0, None))
+    axes.set_title("Return on 50 settings of val" + (": median over seeds, and each seed" if with_spread else ""))
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+    panels = [panel for part in parts[1:] for panel in part.subplots(1, PANELS)]
+    for panel in panels[len(with_spread) :]:
+        panel.remove()
+    for panel, label in zip(panels, with_spread, strict=False):
+        panel.plot(tables[label].index, tables[label], color=colours[label], linewidth=0.7)
+        panel.set(ylim=LIMITS, yticks=(0, 10, 20), xlim=axes.get_xlim(), xticks=axes.get_xticks()[::2][:-1])
+        panel.set_title(label, fontsize=9)
+        panel.tick_params(labelsize=8)
     save(figure, file, 150)
+
+
+def _by_seed(points: Mapping[int, pd.DataFrame]) -> pd.DataFrame:
+    """Returns by epoch, a column for each seed."""
+    return pd.concat([table.set_index("epoch")["return"] for table in points.values()], axis=1)
 
 
 def without_parts(labels: Collection[str]) -> list[str]:
