@@ -5,6 +5,7 @@ The modules of commands import nothing heavy at their top, so that `--help` is q
 
 from __future__ import annotations
 
+import inspect
 import io
 import os
 import sys
@@ -109,7 +110,7 @@ def _parse_commands(commands: Mapping[str, type[Command] | Group], arguments: Se
     message = io.StringIO()
     try:
         with redirect_stderr(message):
-            return tyro.cli(_union(commands), prog="dextron-bench", description=DESCRIPTION, args=arguments)
+            return tyro.cli(_union(commands, arguments), prog="dextron-bench", description=DESCRIPTION, args=arguments)
     except SystemExit as ended:
         if ended.code:
             name, command = _command_name(commands, arguments), _command(commands, arguments)
@@ -135,15 +136,21 @@ def _command(commands: Mapping[str, type[Command] | Group], arguments: Sequence[
     return _command(command[1], arguments[1:]) if isinstance(command, tuple) else command
 
 
-def _union(commands: Mapping[str, type[Command] | Group]) -> Any:
-    """The table of commands as the union type that tyro turns into subcommands."""
+def _union(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str]) -> Any:
+    """The table of commands as the union type that tyro turns into subcommands.
+
+    The help of the table has the first paragraph of each command, and a command's own help has all of it.
+    """
     types: list[Any] = []
     for name, command in commands.items():
+        is_chosen = list(arguments[:1]) == [name]
         if isinstance(command, tuple):
             description, members = command
-            types.append(Annotated[_union(members), tyro.conf.subcommand(name, description=description)])
+            union = _union(members, arguments[1:] if is_chosen else ())
+            types.append(Annotated[union, tyro.conf.subcommand(name, description=description)])
         else:
-            types.append(Annotated[command, tyro.conf.subcommand(name)])
+            summary = None if is_chosen else (inspect.getdoc(command) or "").split("\n\n", 1)[0]
+            types.append(Annotated[command, tyro.conf.subcommand(name, description=summary)])
     return Union[tuple(types)]  # noqa: UP007 (built at run time)
 
 

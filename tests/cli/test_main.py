@@ -181,3 +181,12 @@ def test_help_of_a_command_has_an_example(words: list[str], capsys: pytest.Captu
         main.main([*words, "--help"])
     assert caught.value.code == 0
     assert f"Example: dextron-bench {words[0]}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", [[], ["runs"], ["leaderboard"]])
+def test_help_of_a_table_of_commands_has_no_examples(words: list[str], capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit):
+        main.main([*words, "--help"])
+    text = capsys.readouterr().out
+    assert "Example" not in text
+    assert len(text.splitlines()) < 80
