@@ -60,7 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _limit_threads() -> None:
-    """Gives each product of NumPy and of torch one thread, unless the user sets a variable of THREADS."""
+    """Gives each product of NumPy and of torch one thread, unless the user sets a variable of THREADS.
+
+    If the user wants several, they sleep while they wait for each other, and do not spin, which stalls a busy machine.
+    """
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     if not (limits := {library: 1 for name, library in THREADS.items() if name not in os.environ}):
         return
     import threadpoolctl
