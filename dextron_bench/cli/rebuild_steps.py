@@ -91,9 +91,9 @@ SIM = f"{WEIGHTS}/sim-0.1/minjerk/*"
 SIM_QUICK = f"{WEIGHTS}/sim-0.1-quick/minjerk/*"
 
 
-def _success(reaches: str, rows: int, epochs: int) -> Step:
+def _success(reaches: str, rows: int, epochs: int, labels: tuple[str, ...]) -> Step:
     """The success model, trained on episodes of the experts and of policies that fail often and seldom."""
-    policies = [f"{WEIGHTS}/{label}/{reaches}/*.safetensors" for label in ("bc-quick", "rlil-0.1-quick")]
+    policies = [f"{WEIGHTS}/{label}/{reaches}/*.safetensors" for label in labels]
     data = f"success data --reaches {reaches} --rows {rows} --policies {' '.join(policies)} --runs {{runs}}"
     train = f"success train --reaches {reaches} --epochs {epochs} --runs {{runs}}"
     copies = ((f"success/{reaches}/seed0/model.safetensors", f"{DATA}/success-{reaches}.safetensors"),)
@@ -123,8 +123,8 @@ STEPS: tuple[Step, ...] = (
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
     _run("sor", "sor", "real", SEEDS, (SIM,)),
-    _success("real", 400_000, 15),
-    _success("synthetic", 400_000, 15),
+    _success("real", 4_000_000, 30, ("bc", "rl-hold40", "rlil-0.1")),
+    _success("synthetic", 400_000, 15, ("bc-quick", "rlil-0.1-quick")),
     *(_run("omega", "omega", r, needs=(f"{DATA}/success-{r}.safetensors",)) for r in ("real", "synthetic")),
     Step(
         "recordings",
