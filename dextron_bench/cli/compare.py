@@ -127,11 +127,21 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
 
 
 def _print(comparison: Comparison) -> None:
+    from dextron_bench.scores import cells
+
     _print_scores(comparison)
     _print_flips(comparison.flips, comparison.a.scores.shape[1])
-    print(f"McNemar's exact test: p = {comparison.p_value:.3g}")
+    p_value = cells.p_value(comparison.p_value)
+    print(f"McNemar's exact test: p {p_value if p_value.startswith('<') else f'= {p_value}'}")
     rows = [
-        [row["group"], row["rows"], f"{row['a']:.2f}", f"{row['b']:.2f}", difference_text(row), f"{row['p_holm']:.2g}"]
+        [
+            row["group"],
+            row["rows"],
+            f"{row['a']:.2f}",
+            f"{row['b']:.2f}",
+            difference_text(row),
+            cells.p_value(row["p_holm"]),
+        ]
         for row in comparison.groups.to_dict("records")
     ]
     print_table("mean return by group of settings", ["group", "rows", "A", "B", DIFFERENCE, HOLM], rows)

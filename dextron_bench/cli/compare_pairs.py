@@ -32,6 +32,7 @@ def compare(command: Compare, methods: Sequence[SeedScores]) -> int:
 
 def _print_pairs(methods: Sequence[SeedScores], pairs: pd.DataFrame) -> None:
     """Each method with its number of seeds, and each pair with its difference and p values."""
+    from dextron_bench.scores import cells
     from dextron_bench.scores.paired import SIGNIFICANT
     from dextron_bench.world import task
 
@@ -47,6 +48,6 @@ def _print_pairs(methods: Sequence[SeedScores], pairs: pd.DataFrame) -> None:
         success = {"difference": pair["success"], "low": pair["success_low"], "high": pair["success_high"]}
         texts = difference_text(pair), difference_text({name: 100 * value for name, value in success.items()})
         verdict = "differ" if pair["p_holm"] <= SIGNIFICANT else "within noise"
-        rows.append([pair["a"], pair["b"], *texts, f"{pair['p_value']:.2g}", f"{pair['p_holm']:.2g}", verdict])
+        rows.append([pair["a"], pair["b"], *texts, *(cells.p_value(pair[p]) for p in ("p_value", "p_holm")), verdict])
     columns = ["A", "B", f"return {DIFFERENCE}", f"success % {DIFFERENCE}", "p", HOLM, ""]
     print_table(f"{len(rows)} pairs; {HOLM} is corrected for all of them", columns, rows)

@@ -12,6 +12,7 @@ from typing import Any
 from dextron_bench.evaluation.diagnosis import CAUSES
 
 Row = Mapping[Any, Any]
+SMALLEST_P = 1e-10
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,11 @@ class Score:
 def counted(number: int, noun: str) -> str:
     """A number with its noun, such as "1 seed" and "3 seeds"."""
     return f"{number} {noun}" + ("s" if number != 1 else "")
+
+
+def p_value(p: float) -> str:
+    """A p value with two digits; very small ones are not told apart, since no test is that exact."""
+    return f"{p:.2g}" if p >= SMALLEST_P else f"<{SMALLEST_P:g}"
 
 
 def rank(row: Row) -> str:

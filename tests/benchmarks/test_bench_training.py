@@ -6,10 +6,11 @@ import os
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -80,6 +81,50 @@ def test_updates(benchmark: BenchmarkFixture, agents: int, aim: float | None) ->
     what = f"Updates of SAC for each of {agents} stacked agent{'s'[: agents - 1]}"
     against = "an update of Stable-Baselines3's SAC (two critics; the paper has Q and V)"
     store_rows(benchmark, Row(what, "updates/s", count * agents / seconds, against, count / peer_seconds, aim))
+
+
+@pytest.mark.parametrize("agents", [1, 3, 12])
+def test_products(benchmark: BenchmarkFixture, agents: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """How much of an update are matrix products, which no code of ours can make faster on this processor."""
+    learner, count = Sac([np.random.default_rng(k) for k in range(agents)]), scaled(200)
+    inputs, products = batches(agents, 8), list[Callable[[], torch.Tensor]]()
+    with monkeypatch.context() as patch:
+        for name in ("bmm", "baddbmm"):
+            patch.setattr(torch, name, partial(_call_and_store, getattr(torch, name), products))
+        learner.update(*inputs[0])
+    flops = sum(_operations(product) for product in products)
+
+    def multiply() -> None:
+        for _ in range(count):
+            for product in products:
+                product()
+
+    def update() -> None:
+        for k in range(count):
+            learner.update(*inputs[k % len(inputs)])
+
+    seconds, whole_seconds = time_in_turns(benchmark, multiply, update, ROUNDS)
+    stacked = f"{agents} stacked agent{'s'[: agents - 1]}"
+    rate = f"{count * flops / seconds / 1e9:.0f} GFLOP/s"
+    what = f"Matrix products of SAC's updates alone, {stacked} ({1e-6 * flops / agents:.0f} MFLOP each, {rate})"
+    store_rows(
+        benchmark, Row(what, "updates/s", count * agents / seconds, "whole updates", count * agents / whole_seconds)
+    )
+
+
+def _call_and_store(
+    function: Callable[..., torch.Tensor], calls: list[Callable[[], torch.Tensor]], *tensors: torch.Tensor, **named: Any
+) -> torch.Tensor:
+    """Calls a function, and appends the call to a list."""
+    calls.append(partial(function, *tensors, **named))
+    return calls[-1]()
+
+
+def _operations(product: Callable[[], torch.Tensor]) -> int:
+    """Floating-point operations of a batched product (n, rows, inner) by (n, inner, columns)."""
+    assert isinstance(product, partial)
+    left, right = product.args[-2:]
+    return 2 * left.numel() * right.shape[-1]
 
 
 @pytest.mark.parametrize("agents", [1, 3])

@@ -108,7 +108,7 @@ def test_the_printed_text_has_rows_and_numbers(here: Path, capsys: pytest.Captur
     assert "-0.72 [-" in printed
     assert "1 of 500 settings are solved by more seeds of B: rows 0\n" in printed
     assert "19 of 500 settings are solved by fewer seeds of B: rows 2, 3, 4, 5, 6, ...\n" in printed
-    assert "p = 4.01e-05" in printed
+    assert "p = 4e-05\n" in printed
 
 
 def test_groups_have_p_values_that_are_corrected_for_their_number(compared: Callable[..., dict[str, Any]]):

@@ -36,3 +36,7 @@ def test_an_unknown_value_is_an_empty_cell():
 def test_shares_are_percentages_of_all_episodes():
     row = ROW | dict.fromkeys(set(cells.CAUSES) - ROW.keys(), 0)
     assert sorted(cells.cause_shares(row), key=float)[-2:] == ["11.7", "88.3"]
+
+
+def test_very_small_p_values_are_not_told_apart():
+    assert [cells.p_value(p) for p in (1.0, 0.04567, 3e-9, 9e-11, 0.0)] == ["1", "0.046", "3e-09", "<1e-10", "<1e-10"]
