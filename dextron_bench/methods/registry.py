@@ -15,7 +15,7 @@ from dextron_bench.methods import settings as method_settings
 from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.loading import UnknownMethod, installed_methods
-from dextron_bench.methods.settings import NAME, BadSettings, settings_of
+from dextron_bench.methods.settings import NAME, BadSettings, defaults_of, settings_of
 from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
@@ -23,6 +23,7 @@ __all__ = [
     "NAME",
     "BadSettings",
     "UnknownMethod",
+    "defaults_of",
     "installed_methods",
     "settings_of",
 ]  # Imported to be used as names of this module, too.

@@ -67,6 +67,13 @@ def settings_of(method: Any) -> dict[str, Any]:
         return {}
 
 
+def defaults_of(method: Any) -> dict[str, Any]:
+    """The defaults of a method whose class is no dataclass, which `settings_of` leaves out; a seed is no setting."""
+    if is_dataclass(method):
+        return {}
+    return {name: value for name, (_, value) in _parameters(type(method)).items() if name != "seed"}
+
+
 def in_label(method: Any) -> str:
     """The settings that are not the defaults, as a label has them, such as "-near0.06"."""
     if not is_dataclass(method):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.runs import annotations, result_files
+from dextron_bench.runs import annotations, playing, result_files
 from dextron_bench.storage import schemas
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.training import jobs
@@ -99,7 +99,7 @@ def _entry(
         reaches,
         folder,
         tuple(run.seed for run in members),
-        config.get("settings", {}),
+        {**config.get("defaults", {}), **config.get("settings", {})},
         config.get("code", {}),
         config.get("physics", ""),
         _state(members, left.get((label, reaches))),
@@ -113,6 +113,8 @@ def _entry(
 
 def _state(members: Sequence[RunFolder], training: jobs.UnfinishedTraining | None) -> str:
     """How far the seeds of an entry are, in words."""
+    if played := next(filter(None, map(playing.state, members)), ""):
+        return f"playing, {played}"
     if failures := [text for run in members if (text := annotations.failure(run))]:
         return f"failed: {failures[0]}"
     if training is not None:

@@ -11,7 +11,7 @@ from dextron_bench.methods import registry, weights
 from dextron_bench.methods.agents import Agent, Privileged, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.reaches import sources
-from dextron_bench.runs import result_files, run_files
+from dextron_bench.runs import playing, result_files, run_files
 from dextron_bench.runs.evaluation_job import EvaluationJob, Played
 from dextron_bench.runs.plans import Run, no_weights
 from dextron_bench.splits.loading import Split, load_split
@@ -56,7 +56,8 @@ def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progre
             load_split(run.source, name)
         train([run], runs, threads)
     job = prepare(run, runs, threads)
-    table = job.table(report)
+    with playing.shown(job.folder, report) as report_and_show:
+        table = job.table(report_and_show)
     result_files.write_result(job.folder, table, job.facts, training.seconds(run.seed) if training else None)
     return job.folder.path
 
@@ -75,7 +76,7 @@ def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
             "nothing; train it first with `--split val` and without --share, and copy the folder of runs"
         )
     player = agent(run, file)  # If this raises, there is no folder yet.
-    folder_config.write_or_check(folder.path, run.config())
+    folder_config.write_or_check(folder.path, run.config(), registry.defaults_of(run.method))
     copy = run_files.copy_weights(file, folder) if file else None
 
     def play(split: Split, rows: range) -> Played:

@@ -15,6 +15,7 @@ import pandas as pd
 from dextron_bench.evaluation import episode_table
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
+from dextron_bench.methods import registry
 from dextron_bench.reaches import sources
 from dextron_bench.runs import execution, run_files
 from dextron_bench.runs.plans import Run
@@ -106,7 +107,7 @@ class _Player:
     def __init__(self, run: Run, split: Split, runs: Path, threads: int) -> None:
         self._split, self._folder = split, run.folder(runs)
         agent = execution.agent(run, run.plan.weights)  # If this raises, there is no folder yet.
-        folder_config.write_or_check(self._folder.path, run.config())
+        folder_config.write_or_check(self._folder.path, run.config(), registry.defaults_of(run.method))
         if run.plan.weights:
             run_files.copy_weights(run.plan.weights, self._folder)
         stored = run_files.stored_episodes(self._folder, [split])

@@ -35,7 +35,7 @@ class RunFilter:
     since: str = ""
     """A date, such as 2026-01-31: only runs that changed since."""
     state: str = ""
-    """The beginning of a state: done, training, stopped, unfinished, failed."""
+    """The beginning of a state: done, training, playing, stopped, unfinished, failed."""
 
     def __post_init__(self) -> None:
         for text in self.setting:

@@ -32,7 +32,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def p_value(p: float) -> str:
-    """A p value with two digits; very small ones are not told apart, since no test is that exact."""
+    """A p value with two digits; of very small ones only that they are small, since no test is that exact."""
     return f"{p:.2g}" if p >= SMALLEST_P else f"<{SMALLEST_P:g}"
 
 

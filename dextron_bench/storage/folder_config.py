@@ -22,15 +22,17 @@ def check(folder: Path, config: Mapping[str, Any]) -> None:
     _check(RunFolder(folder).config, config, "run", RUN_ADVICE)
 
 
-def write_or_check(folder: Path, config: Mapping[str, Any]) -> None:
+def write_or_check(folder: Path, config: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> None:
     """Writes config and provenance of a run if there is no config yet; raises the same errors as `check`.
 
-    `config` contains the hash of the physics.
+    `config` contains the hash of the physics. `defaults` belong to a method whose config has only the settings that
+    differ from them. They are stored with it for readers, and never compared.
     """
     run = RunFolder(folder)
     if not run.config.exists():  # The config is written last: if it exists, the provenance exists too.
         atomic.write_json(run.provenance, provenance.collect(config["physics"]))
-    write_or_check_file(run.config, config, "run", RUN_ADVICE)
+        atomic.write_json(run.config, {**config, "defaults": defaults} if defaults else config)
+    _check(run.config, config, "run", RUN_ADVICE)
 
 
 def write_or_check_file(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:

@@ -163,7 +163,9 @@ POINT = entries({"epoch": COUNT, "return": RETURN, "success": number(0.0, 1.0)})
 CURVE = entries({"points": list_of(POINT)}, {"split": text})
 ACTIONS = list_of(list_of(number(-1.0, 1.0)))
 VAL_SCORES = entries({"digest": text, "scores": list_of(RETURN, 1)}, {"sha256": text, "actions": ACTIONS})
-CONFIG = entries({}, {"method": text, "reaches": text, "seed": COUNT, "settings": OBJECT, "physics": text})
+CONFIG = entries(
+    {}, {"method": text, "reaches": text, "seed": COUNT, "settings": OBJECT, "defaults": OBJECT, "physics": text}
+)
 METHOD_CONFIG = entries({"code": CODE, "settings": OBJECT, "physics": text})
 SEARCH = entries({"search": OBJECT, "physics": text})
 RECORDINGS = map_of(text)

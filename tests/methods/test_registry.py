@@ -188,6 +188,7 @@ def test_parameters_of_a_class_that_is_no_dataclass_are_settings(file: Callable[
     default, near = registry.create(spec, {"near": 0.08, "mode": "fast"}), registry.create(spec, {"near": 0.06})
     assert [registry.label(method) for method in (default, near)] == ["mine", "mine-near0.06"]
     assert [registry.settings_of(method) for method in (default, near)] == [{}, {"near": 0.06}]
+    assert registry.defaults_of(near) == {"near": 0.08, "mode": "fast", "size": None, "hot": False, "sizes": (1,)}
     settings = {"near": 0.06, "mode": "fast", "hot": True, "sizes": (3, 4)}
     assert registry.as_flags(spec, settings) == f"--method {spec} --near 0.06 --hot --sizes 3 4"
 

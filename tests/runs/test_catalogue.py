@@ -108,6 +108,14 @@ def test_orders(runs: Path, order: str, split: str, expected: list[str]):
     assert names(search.ordered(catalogue.entries(runs), order, split)) == expected
 
 
+def test_defaults_count_as_settings(runs: Path):
+    run = write_run(runs, "plain-lead0.03", 0, [20.0], lead=0.03)
+    run.config.write_text(json.dumps(json.loads(run.config.read_text()) | {"defaults": {"near": 0.08, "lead": 0.06}}))
+    plain = catalogue.find(catalogue.entries(runs), "plain-lead0.03")
+    assert plain.settings == {"near": 0.08, "lead": 0.03}
+    assert RunFilter(setting=("near=0.08",)).passes(plain)
+
+
 def test_settings_that_differ(runs: Path):
     _, mine, near = catalogue.entries(runs)
     assert search.differing_settings([mine, near]) == ["near"]

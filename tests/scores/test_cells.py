@@ -38,5 +38,5 @@ def test_shares_are_percentages_of_all_episodes():
     assert sorted(cells.cause_shares(row), key=float)[-2:] == ["11.7", "88.3"]
 
 
-def test_very_small_p_values_are_not_told_apart():
+def test_very_small_p_values_look_alike():
     assert [cells.p_value(p) for p in (1.0, 0.04567, 3e-9, 9e-11, 0.0)] == ["1", "0.046", "3e-09", "<1e-10", "<1e-10"]

@@ -35,6 +35,14 @@ def test_an_equal_config_passes_and_changes_no_byte(tmp_path: Path, monkeypatch:
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
+def test_defaults_are_stored_for_readers_and_not_compared(tmp_path: Path):
+    """So a folder from before defaults were stored, and one whose code has other defaults, are the same run."""
+    folder_config.write_or_check(tmp_path, CONFIG, {"near": 0.08})
+    assert json.loads((tmp_path / "config.json").read_text())["defaults"] == {"near": 0.08}
+    folder_config.write_or_check(tmp_path, CONFIG, {"near": 0.07})
+    folder_config.write_or_check(tmp_path, CONFIG)
+
+
 def test_a_folder_without_a_config_passes_the_check(tmp_path: Path):
     folder_config.check(tmp_path / "new", CONFIG)
     assert not (tmp_path / "new").exists()
