@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -164,14 +163,20 @@ class Run:
 
     def _following(self, group: list[plans.Run]) -> AbstractContextManager[None]:
         """Trackers follow the trainings of a group, in processes of their own."""
+        from dextron_bench.methods import registry
+
         names = [*dict.fromkeys(self.tracker), *(["live"] if self.live else [])]
         job = group[0].training_job(self.runs)
+        if names and job is None and group[0].label not in registry.FLOORS:
+            print_warning(f"{group[0].label} does not train, so there is nothing to follow")
         if not names or job is None:
             return nullcontext()
         from dextron_bench.tracking import launch
 
-        folders = job.training_folders([run.seed for run in group])
-        return launch.following(folders, names, lambda line: print(f"dextron-bench: {line}", file=sys.stderr))
+        seeds = [run.seed for run in group]
+        is_over = all(job.run_folder(seed).weights.exists() for seed in seeds)
+        grace = launch.PATIENCE if is_over else launch.GRACE
+        return launch.following(job.training_folders(seeds), names, print_warning, grace)
 
     def _estimate(self, groups: list[list[plans.Run]]) -> int:
         from dextron_bench.runs.estimates import estimate

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from dextron_bench.runs.catalogue import Entry
 
 COLUMNS = ("run", "state", "seeds", "val", "return", "success", "date", "tags", "note")
+INTERVALS = ("return", "success %")  # The scores that are shown with an interval.
 SETTINGS = "settings."  # Begins the name of a column with a setting.
 
 
@@ -34,8 +35,8 @@ class List:
     filter: Annotated[RunFilter, tyro.conf.arg(name="")] = field(default_factory=RunFilter)
     split: str = "test"
     """The split of the columns `return` and `success`."""
-    sort: Literal["name", "date", "return", "success"] = "name"
-    """The order: by name, newest first, or highest score on the split first."""
+    sort: Literal["name", "date", "val", "return", "success"] = "name"
+    """The order: by name, newest first, or highest score first: return on val, or return or success on the split."""
     columns: tuple[str, ...] = COLUMNS
     """The columns: some of run, state, seeds, val, return, success, date, tags, note, physics, settings.NAME."""
     json: bool = False
@@ -46,7 +47,9 @@ class List:
     def __call__(self) -> int:
         from dextron_bench.runs import catalogue, search
 
-        entries = search.ordered(filter(self.filter.passes, catalogue.entries(self.runs)), self.sort, self.split)
+        known = catalogue.entries(self.runs)
+        search.check_split(known, self.split)
+        entries = search.ordered(filter(self.filter.passes, known), self.sort, self.split)
         rows = [{name: _cell(entry, name, self.split) for name in self.columns} for entry in entries]
         if self.json:
             print_json(rows)
@@ -79,7 +82,7 @@ class Show:
         entry = catalogue.find(catalogue.entries(self.runs), self.run)
         about = {name: _cell(entry, name, "test") for name in ("run", "state", "date", "tags", "note", "physics")}
         about |= {"folder": str(entry.folder), "seeds": list(entry.seeds), "code": code_of(entry)}
-        about["settings"] = dict(entry.settings)
+        about |= {"settings": dict(entry.settings), "command": _command(entry)}
         splits = [
             {"split": name, "seeds": len(scores), "rows": scores.shape[1]}
             | {what: entry.score(name, what) for what in ("return", "success")}
@@ -88,9 +91,13 @@ class Show:
         if self.json:
             print_json(about | {"splits": splits})
             return DONE
+        about["settings"] = ", ".join(f"{name} {value}" for name, value in entry.settings.items())
         print_table(entry.name, ["", ""], [[name, plain(value)] for name, value in about.items() if name != "run"])
-        columns = ["split", "seeds", "rows", "return", "success"]
-        print_table("scores", columns, [[_shown(row[name], name) for name in columns] for row in splits])
+        rows = [
+            [name, *scores.shape, *(interval_text(entry, name, what) for what in INTERVALS)]
+            for name, scores in entry.scores.items()
+        ]
+        print_table("scores", ["split", "seeds", "rows", *(f"{what} [95 %]" for what in INTERVALS)], rows)
         return DONE
 
 
@@ -144,6 +151,33 @@ def _cell(entry: Entry, name: str, split: str) -> Any:
 
         raise search.BadSearch(f"no column {name!r}; choose from {', '.join(values)} and {SETTINGS}NAME")
     return values[name]
+
+
+def interval_text(entry: Entry, split: str, what: str) -> str | None:
+    """A run's mean score on a split with its 95 % interval, `what` being one of INTERVALS; None if it has no score."""
+    from dextron_bench.scores import statistics
+    from dextron_bench.world import task
+
+    if (scores := entry.scores.get(split)) is None:
+        return None
+    if what == "return":
+        score = statistics.estimate(scores)
+        return f"{score.mean:.2f} [{score.low:.2f}, {score.high:.2f}]"
+    share = statistics.estimate((scores == task.SUCCESS).astype(float), statistics.SHARES)
+    return f"{100 * share.mean:.1f} [{100 * share.low:.1f}, {100 * share.high:.1f}]"
+
+
+def _command(entry: Entry) -> str:
+    """The command that makes a run again, as far as its config says."""
+    from dextron_bench.methods import registry
+
+    settings = {name: value for name, value in entry.settings.items() if value is not None}
+    try:
+        flags = registry.as_flags(str(entry.code.get("class", entry.label)), settings)
+    except registry.UnknownMethod:  # Its file lies elsewhere.
+        words = [f"--method {entry.code.get('class')}", *(registry.as_flag(*one) for one in settings.items())]
+        flags = " ".join(words)
+    return f"dextron-bench run {flags} --reaches {entry.reaches} --seed {' '.join(map(str, entry.seeds))}"
 
 
 def code_of(entry: Entry) -> str:

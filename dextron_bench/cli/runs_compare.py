@@ -11,10 +11,14 @@ import tyro
 
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table
-from dextron_bench.cli.runs import code_of, plain
+from dextron_bench.cli.runs import INTERVALS, code_of, interval_text, plain
 
 if TYPE_CHECKING:
     from dextron_bench.runs.catalogue import Entry
+
+
+class NoCurves(ValueError):
+    """A picture of learning curves is asked for, of runs that have none."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,8 @@ class Compare:
 
         known = catalogue.entries(self.runs)
         entries = [catalogue.find(known, name) for name in self.run]
+        if self.into is not None and not any(entry.curves for entry in entries):
+            raise NoCurves("none of these runs has a learning curve to draw: leave out --into")
         names = search.differing_settings(entries)
         settings = {entry.name: {name: _setting(entry, name) for name in names} for entry in entries}
         scores = _scores(entries)
@@ -60,18 +66,13 @@ def _setting(entry: Entry, name: str) -> Any:
 
 
 def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
-    """A row for each split, with each run's mean return and its interval."""
-    from dextron_bench.scores import statistics
-
-    rows = []
-    for split in dict.fromkeys(split for entry in entries for split in entry.scores):
-        row = {"split": split}
-        for entry in entries:
-            if split in entry.scores:
-                score = statistics.estimate(entry.scores[split])
-                row[entry.name] = f"{score.mean:.2f} [{score.low:.2f}, {score.high:.2f}]"
-        rows.append({"split": split, **{entry.name: row.get(entry.name) for entry in entries}})
-    return rows
+    """Two rows for each split, with each run's mean return and its success rate [%], and their intervals."""
+    splits = dict.fromkeys(split for entry in entries for split in entry.scores)
+    return [
+        {"split": f"{split}, {what}", **{entry.name: interval_text(entry, split, what) for entry in entries}}
+        for split in splits
+        for what in INTERVALS
+    ]
 
 
 def _draw(entries: Sequence[Entry], file: Path) -> None:

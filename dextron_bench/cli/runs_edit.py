@@ -95,6 +95,7 @@ class Archive:
                 raise AlreadyArchived(f"{place} exists; remove it, or give it another name")
             place.parent.mkdir(parents=True, exist_ok=True)
             shutil.move(entry.folder, place)
+            _remove_if_empty(entry.folder.parent)
             print(place)
         return DONE
 
@@ -123,6 +124,7 @@ class Remove:
                 return DONE
         for entry in entries:
             shutil.rmtree(entry.folder)
+            _remove_if_empty(entry.folder.parent)
         return DONE
 
 
@@ -148,6 +150,12 @@ class Export:
         chosen = [catalogue.find(entries, name) for name in self.run] if self.run else entries
         print(f"{mlflow_files.write(chosen, self.into)} runs in {self.into}")
         return DONE
+
+
+def _remove_if_empty(folder: Path) -> None:
+    """Removes the folder of a label that has no runs any more."""
+    if not any(folder.iterdir()):
+        folder.rmdir()
 
 
 def _find(runs: Path, name: str) -> Entry:

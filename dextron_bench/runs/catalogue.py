@@ -115,10 +115,12 @@ def _state(members: Sequence[RunFolder], training: jobs.UnfinishedTraining | Non
     """How far the seeds of an entry are, in words."""
     if played := next(filter(None, map(playing.state, members)), ""):
         return f"playing, {played}"
+    if training is not None and training.is_running:
+        return f"training, {training.left} left"
     if failures := [text for run in members if (text := annotations.failure(run))]:
         return f"failed: {failures[0]}"
     if training is not None:
-        return f"{'training' if training.is_running else 'stopped'}, {training.left} left"
+        return f"stopped, {training.left} left"
     return DONE if all(run.result.exists() for run in members) else UNFINISHED
 
 

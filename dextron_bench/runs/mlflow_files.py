@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from dextron_bench.runs.catalogue import Entry
 from dextron_bench.storage import hashing
 from dextron_bench.storage.folders import visible
+from dextron_bench.training import loop, metric_rows
 from dextron_bench.world import task
 
 EXPERIMENT, NAME = "1", "dextron-bench"
@@ -55,7 +57,9 @@ def _write_run(experiment: Path, entry: Entry, seed: int, position: int) -> None
         }),
     )  # fmt: skip
     (run / "artifacts").mkdir(parents=True, exist_ok=True)
-    params = {"method": entry.label, "reaches": entry.reaches, "seed": seed, "physics": entry.physics, **entry.settings}
+    about = {"method": entry.label, "reaches": entry.reaches, "seed": seed, "physics": entry.physics}
+    code = {f"code.{name}": value for name, value in entry.code.items() if value}
+    params = about | code | dict(entry.settings)
     for name, value in params.items():
         _write(run / "params" / name, str(value))
     for name, value in {**dict.fromkeys(entry.tags, "true"), "mlflow.runName": f"{entry.name}/seed{seed}"}.items():
@@ -72,6 +76,18 @@ def _write_run(experiment: Path, entry: Entry, seed: int, position: int) -> None
         lines = [f"{stamp} {float(point[name])} {int(point['epoch'])}\n" for point in points]
         if lines:
             _write(run / "metrics" / f"val_curve.{name}", "".join(lines))
+    for name, lines in _training(entry, seed, stamp).items():
+        _write(run / "metrics" / f"train.{name}", "".join(lines))
+
+
+def _training(entry: Entry, seed: int, stamp: int) -> dict[str, list[str]]:
+    """The lines of each metric of a seed's training, a line for each epoch; raises DamagedFile."""
+    lines: dict[str, list[str]] = defaultdict(list)
+    folders = [folder for folder, seeds in loop.training_folders(entry.folder).items() if seed in seeds]
+    for row in (row for folder in folders for row in metric_rows.read(folder) if row["seed"] == seed):
+        for name in row.keys() - {"epoch", "seed"}:
+            lines[name].append(f"{stamp} {float(row[name])} {row['epoch']}\n")
+    return lines
 
 
 def _write(file: Path, text: str) -> None:

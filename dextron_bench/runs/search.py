@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from dextron_bench.runs.catalogue import Entry
 
 SCORES = ("return", "success")
-ORDERS = ("name", "date", *SCORES)
+VAL = "val"  # Orders by the mean return on the split of this name, whatever the split is.
+ORDERS = ("name", "date", VAL, *SCORES)
+STATES = ("done", "training", "playing", "stopped", "unfinished", "failed")  # The first words of states.
 
 
 class BadSearch(ValueError):
@@ -43,6 +45,8 @@ class RunFilter:
                 raise BadSearch(f"--setting {text!r}: write a name and a value, as in near=0.06")
         if self.since:
             _date(self.since)
+        if not any(known.startswith(self.state) or self.state.startswith(known) for known in STATES):
+            raise BadSearch(f"--state {self.state!r}: choose from {', '.join(STATES)}")
 
     def passes(self, entry: Entry) -> bool:
         """True for a run that the filter selects."""
@@ -60,16 +64,25 @@ class RunFilter:
 def ordered(entries: Iterable[Entry], order: str, split: str) -> list[Entry]:
     """Entries by name, with the newest first by "date", with the highest score on a split first by "return", "success".
 
-    Entries without the score come last. Raises BadSearch.
+    By "val" the highest mean return on `val` comes first. Entries without the score come last. Raises BadSearch.
     """
     known = sorted(entries, key=lambda entry: (entry.label, entry.reaches))
     if order == "name":
         return known
     if order == "date":
         return sorted(known, key=lambda entry: entry.changed, reverse=True)
+    if order == VAL:
+        return sorted(known, key=lambda entry: _last_if_nan(entry.score(VAL)))
     if order not in SCORES:
         raise BadSearch(f"--sort {order!r}: choose from {', '.join(ORDERS)}")
     return sorted(known, key=lambda entry: _last_if_nan(entry.score(split, order)))
+
+
+def check_split(entries: Sequence[Entry], split: str) -> None:
+    """Raises BadSearch if runs have played splits, but no run the given one."""
+    played = dict.fromkeys(name for entry in entries for name in entry.scores)
+    if played and split not in {VAL, *played}:
+        raise BadSearch(f"no run has played {split!r}; there are {', '.join(played)}")
 
 
 def differing_settings(entries: Sequence[Entry]) -> list[str]:

@@ -24,6 +24,7 @@ from dextron_bench.storage.run_folder import TRACKING
 COMMAND = (sys.executable, "-m", "dextron_bench.tracking.process")
 LIVE = "live"  # The tracker that opens a window, which stays open after the training.
 GRACE = 30.0  # [s] after the training in which trackers show the rest.
+PATIENCE = 3600.0  # [s] instead, for a training that was over before: nothing runs that a tracker could slow.
 MARGIN = 10.0  # [s] after that in which their processes end.
 
 
@@ -140,7 +141,8 @@ def _wait(follower: _Follower, deadline: float) -> bool:
 
 
 def _line(follower: _Follower, counts: dict[str, Any], was_killed: bool) -> str:
-    text = f"tracker {follower.name}: {counts['points']} points and {counts['evaluations']} evaluations"
+    evaluations = f"{counts['evaluations']} evaluation{'s' * (counts['evaluations'] != 1)}"
+    text = f"tracker {follower.name}: {counts['points']} points and {evaluations}"
     text += f" with episodes in {follower.into}" if follower.name != LIVE else " with episodes shown"
     if counts["dropped"]:
         text += f"; {counts['dropped']} dropped ({counts['error']})"

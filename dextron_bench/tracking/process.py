@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 from dextron_bench.tracking import live, trackers
-from dextron_bench.tracking.follower import POLL, Counts, Follower
-from dextron_bench.tracking.launch import LIVE, MARGIN, counts_file
+from dextron_bench.tracking.follower import PENDING, POLL, Counts, Follower
+from dextron_bench.tracking.launch import GRACE, LIVE, MARGIN, counts_file
 from dextron_bench.tracking.training_files import TrainingFiles
 from dextron_bench.training import loop
 
@@ -45,7 +45,8 @@ def _follow(name: str, files: TrainingFiles, into: Path, ended: _EndOfInput, gra
     if name == LIVE:
         live.watch([files], ended.is_set, note)
         return
-    follower = Follower(files, trackers.create(name, files, into))
+    pending = PENDING if grace <= GRACE else sys.maxsize  # A training that is over does not outrun the tracker.
+    follower = Follower(files, trackers.create(name, files, into), pending)
     follower.run(ended.is_set, lambda: ended.seconds > grace, note)
 
 

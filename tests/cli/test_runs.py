@@ -73,10 +73,17 @@ def test_a_run_is_shown_and_compared(runs: Callable[..., str]):
     assert json.loads(runs("show", "exp", "--json"))["splits"] == [
         {"split": "test", "seeds": 1, "rows": 2, "return": 20.0, "success": 1.0}
     ]
-    assert "baselines.exp:Exp" in runs("show", "exp")
+    shown = runs("show", "exp")
+    assert "dextron-bench run --method baselines.exp:Exp --reaches synthetic --seed 0 " in shown
+    assert "20.00 [20.00, 20.00]" in shown
+    assert "100.0 [100.0, 100.0]" in shown
+    assert "--near 0.2 --reaches synthetic" in runs("show", "mine-near0.2")
     compared = json.loads(runs("compare", "mine", "mine-near0.2", "--json"))
     assert compared["settings"] == {"mine/synthetic": {"near": 0.1}, "mine-near0.2/synthetic": {"near": 0.2}}
-    assert compared["scores"][0]["mine/synthetic"] == "0.00 [0.00, 0.00]"
+    assert [(row["split"], row["mine/synthetic"]) for row in compared["scores"]] == [
+        ("test, return", "0.00 [0.00, 0.00]"),
+        ("test, success %", "0.0 [0.0, 0.0]"),
+    ]
     assert "near" in runs("compare", "mine", "mine-near0.2")
     assert runs("best", "--split", "test") == "mine/synthetic: return 0.00, success 0.0 % on test\n"
 
@@ -94,9 +101,11 @@ def test_runs_are_archived_and_removed_only_when_that_is_confirmed(
 ):
     assert runs("archive", "mine") == "runs-archive/mine/synthetic\n"
     assert (here / "runs-archive/mine/synthetic/seed0/result.json").exists()
+    assert not (here / "runs/mine").exists()
     assert main.main(["runs", "rm", "exp"]) == 2
     assert "confirm with --yes" in capsys.readouterr().err
     runs("rm", "exp", "--yes")
+    assert not (here / "runs/exp").exists()
     assert {row["run"] for row in json.loads(runs("list", "--json"))} == {"broken/synthetic", "mine-near0.2/synthetic"}
 
 
@@ -105,6 +114,9 @@ def test_runs_are_archived_and_removed_only_when_that_is_confirmed(
     [
         (["show", "nix"], "no run is called 'nix'; the folder has broken/synthetic, exp/synthetic"),
         (["list", "--columns", "nix"], "no column 'nix'; choose from run, state"),
+        (["list", "--split", "nix"], "no run has played 'nix'; there are test\n"),
+        (["list", "--state", "nix"], "--state 'nix': choose from done, training, playing"),
+        (["compare", "exp", "mine", "--into", "curves.png"], "none of these runs has a learning curve to draw"),
         (["list", "--since", "today"], "write a date such as 2026-01-31"),
         (["best", "--split", "open"], "none of the 3 runs has a score on 'open'"),
         (["tag", "exp", "a b"], "use letters, digits and"),

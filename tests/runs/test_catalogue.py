@@ -98,6 +98,7 @@ def test_filters(runs: Path, chosen: dict, expected: list[str]):
         ("name", "test", ["learner", "mine", "mine-near0.06"]),
         ("return", "test", ["mine-near0.06", "mine", "learner"]),
         ("return", "val", ["learner", "mine", "mine-near0.06"]),
+        ("val", "test", ["learner", "mine", "mine-near0.06"]),
         ("date", "test", ["mine-near0.06", "learner", "mine"]),
     ],
 )
@@ -148,7 +149,11 @@ def test_bad_notes_are_refused(notes: dict):
 
 @pytest.fixture
 def exported(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All runs as files for MLflow."""
+    """All runs as files for MLflow; the learner with the metrics of its training, in which another seed trained too."""
+    training = runs / "learner/real/training-0+1"
+    training.mkdir()
+    rows = [{"epoch": epoch, "seed": seed, "score": epoch + 0.5 - seed} for epoch in (1, 2) for seed in (0, 1)]
+    (training / "metrics.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     annotations.write(runs / "mine/real", annotations.Notes(("good",), "two\nlines"))
     folder = tmp_path_factory.mktemp("exported") / "mlruns"
     assert mlflow_files.write(catalogue.entries(runs), folder) == 4
@@ -161,6 +166,7 @@ def test_files_for_mlflow_hold_settings_scores_and_curves(exported: Path, runs: 
     }
     stamp = texts["metrics/val_curve.return"].split()[0]
     assert texts["metrics/val_curve.return"] == f"{stamp} 3.0 10\n{stamp} 2.0 20\n"
+    assert texts["metrics/train.score"] == f"{stamp} 1.5 1\n{stamp} 2.5 2\n"
     assert {(file.read_text()) for file in exported.rglob("params/near")} == {"0.08", "0.06"}
     with pytest.raises(mlflow_files.NotEmpty):
         mlflow_files.write(catalogue.entries(runs), exported)

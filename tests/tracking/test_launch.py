@@ -72,7 +72,7 @@ def test_what_was_dropped_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     _, (line,) = tracked(tmp_path, WRITES, monkeypatch, grace=60.0)
     into = tmp_path / "runs/toy-0.1/synthetic/tracking-0+3/wandb"
     assert line == (
-        f"tracker wandb: 7 points and 1 evaluations with episodes in {into}; 2 dropped (OSError: no connection)"
+        f"tracker wandb: 7 points and 1 evaluation with episodes in {into}; 2 dropped (OSError: no connection)"
     )
 
 

@@ -89,10 +89,12 @@ def test_run_starts_trackers_beside_its_training(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
 ):
     followed: list[tuple[list[str], list[str]]] = []
+    graces: list[float] = []
 
     @contextmanager
-    def following(folders: list[Path], names: list[str], say: Callable[[str], None]) -> Iterator[None]:
+    def following(folders: list[Path], names: list[str], say: Callable[[str], None], grace: float) -> Iterator[None]:
         followed.append(([str(folder) for folder in folders], names))
+        graces.append(grace)
         yield
         say("tracker rerun: 16 points")
 
@@ -106,6 +108,7 @@ def test_run_starts_trackers_beside_its_training(
     before = tiny_training.contents(Path(FOLDER))
     assert main.main([*words, "--json", "--seed", "0", "3", "--tracker", "rerun"]) == 0  # Shows the finished training.
     assert followed[1] == (["runs/toy-0.1/synthetic/training-0+3"], ["rerun"])
+    assert graces == [launch.GRACE, launch.PATIENCE]
     assert tiny_training.contents(Path(FOLDER)) == before
     assert main.main([*words, "--json"]) == 0
     assert len(followed) == 2
