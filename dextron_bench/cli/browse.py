@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +20,6 @@ if TYPE_CHECKING:
     from dextron_bench.browse.search import Search
 
 PATIENCE = 2.0  # [s] in which a viewer that cannot start has ended.
-
-
-class NoScreen(RuntimeError):
-    """The native viewer needs a screen."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +58,9 @@ class Browse:
         from dextron_bench.runs import episode_catalogue
 
         if not self.json and not self.web:
-            _check_screen()
+            from dextron_bench.recording import require_screen
+
+            require_screen()
         search = Search(self.where, self.order)
         episodes = episode_catalogue.read(self.place)
         matching = search.matching(episodes)  # Raises BadExpression before anything is served.
@@ -86,12 +83,6 @@ class Browse:
                 port = server.server_port
                 print_warning(f"on your own machine: ssh -N -L {port}:127.0.0.1:{port} HOST, then open this address")
             server.serve_forever()
-
-
-def _check_screen() -> None:
-    """Raises NoScreen on Linux without a display."""
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise NoScreen("there is no screen for the native viewer; --web opens recordings in the browser")
 
 
 def _show(file: Path) -> None:

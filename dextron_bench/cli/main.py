@@ -119,7 +119,8 @@ def _parse_commands(commands: Mapping[str, type[Command] | Group], arguments: Se
         if ended.code:
             name, command = _command_name(commands, arguments), _command(commands, arguments)
             known = list(command) if isinstance(command, Mapping) else usage.flags(command)
-            line = usage.with_nearest(usage.one_line(message.getvalue()), known)
+            unknown = "" if isinstance(command, Mapping) else usage.unknown_flag(arguments, known)
+            line = unknown or usage.with_nearest(usage.one_line(message.getvalue()), known)
             print(f"dextron-bench: {line}; see `{' '.join(['dextron-bench', *name])} --help`", file=sys.stderr)
         raise
 

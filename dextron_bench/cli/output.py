@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from dextron_bench.storage.printable import printable, printable_line
 from dextron_bench.storage.progress import Progress, no_progress
@@ -105,23 +105,31 @@ def progress_bar(title: str, quiet: bool = False) -> Iterator[Progress]:
 
 
 class _Lines:
-    """A progress report that prints a line when LINE_PERIOD has passed since the last one, or since the start."""
+    """A progress report that prints a line when LINE_PERIOD has passed since the last one of any report of the process.
+
+    So many short pieces of work have a line each minute, too.
+    """
+
+    printed: ClassVar[float | None] = None  # When the last line was printed, or the first report began.
 
     def __init__(self, title: str) -> None:
         self._title, self._start = title, time.monotonic()
-        self._printed, self._first, self._last = self._start, -1, -1
+        self._first, self._last = -1, -1
+        if _Lines.printed is None:
+            _Lines.printed = self._start
 
     def __call__(self, done: int, total: int, note: str = "") -> None:
         now = time.monotonic()
         if done < self._last or self._first < 0:  # Other work begins; what was done before is not part of the rate.
-            self._first, self._start, self._printed = done, now, now
+            self._first, self._start = done, now
         self._last = done
-        if now - self._printed < LINE_PERIOD:
+        if now - (_Lines.printed or 0.0) < LINE_PERIOD:
             return
-        self._printed = now
-        speed = (done - self._first) / (now - self._start)
+        _Lines.printed = now
+        speed = (done - self._first) / (now - self._start) if now > self._start else 0.0
         left = f", {_duration((total - done) / speed)} left" if total and speed else ""
-        parts = f"{self._title}: {done}{f'/{total}' if total else ''}", f"{_rate(speed)}{left}", printable(note)
+        rate = f"{_rate(speed)}{left}" if speed else ""
+        parts = f"{self._title}: {done}{f'/{total}' if total else ''}", rate, printable(note)
         print(", ".join(filter(None, parts)), file=sys.stderr, flush=True)
 
 

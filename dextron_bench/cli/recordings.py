@@ -54,6 +54,8 @@ class List(EpisodeFlags):
             rows = [_row(summary) for summary in shown]
             cells = [["" if cell is None else cell for cell in list(row.values())[:-1]] for row in rows]
             print_table("recordings", list(rows[0])[:-1], cells)
+        elif not damaged:
+            print(f"none of {len(files)} recordings passes the filter")
         for summary in damaged:
             print_warning(f"{summary.file}: {summary.damage}")
         return DIFFERS if damaged else DONE

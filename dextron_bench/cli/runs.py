@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 COLUMNS = ("run", "state", "seeds", "val", "return", "success", "date", "tags", "note")
 INTERVALS = ("return", "success %")  # The scores that are shown with an interval.
+SPLIT = "test"  # By default; a folder may have no scores on it yet.
 SETTINGS = "settings."  # Begins the name of a column with a setting.
 
 
@@ -33,7 +34,7 @@ class List:
     runs: Path = Path("runs")
     """Folder of all runs."""
     filter: Annotated[RunFilter, tyro.conf.arg(name="")] = field(default_factory=RunFilter)
-    split: str = "test"
+    split: str = SPLIT
     """The split of the columns `return` and `success`."""
     sort: Literal["name", "date", "val", "return", "success"] = "name"
     """The order: by name, newest first, or highest score first: return on val, or return or success on the split."""
@@ -48,7 +49,8 @@ class List:
         from dextron_bench.runs import catalogue, search
 
         known = catalogue.entries(self.runs)
-        search.check_split(known, self.split)
+        if self.split != SPLIT:
+            search.check_split(known, self.split)
         entries = search.ordered(filter(self.filter.passes, known), self.sort, self.split)
         rows = [{name: _cell(entry, name, self.split) for name in self.columns} for entry in entries]
         if self.json:

@@ -57,7 +57,7 @@ class Submit:
     runs: Path = Path("runs")
     """Folder of all runs."""
     board: Path = Path("leaderboard")
-    """Folder of the leaderboard; the printed table has its methods too."""
+    """Folder of the leaderboard; the printed table has its methods too. Without it: the published leaderboard."""
     cluster: clusters.Flag = ""
     """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
@@ -132,9 +132,10 @@ class Submit:
         results = [
             result_files.read_result(RunFolder.of_seed(folder, seed).result) for seed in dict.fromkeys(self.seed)
         ]
+        published = self.board / collect.RESULTS
         results += [
             result
-            for result in result_files.results(self.board / collect.RESULTS)
+            for result in result_files.results(published if published.exists() else result_files.published_results())
             if result["method"] != self.name and result["reaches"] == self.reaches
         ]
         rows = standings.table(results)

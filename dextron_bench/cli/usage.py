@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from itertools import groupby
 from typing import Any
 
@@ -45,10 +45,24 @@ def with_nearest(message: str, known: Iterable[str]) -> str:
     """The line about an unknown word with the nearest of the `known` flags or commands; other lines unchanged."""
     if not (match := UNKNOWN.match(message)):
         return message
-    word = match[1]
-    [nearest] = difflib.get_close_matches(word, known, 1) or [""]
+    return _unknown(match[1], known)
+
+
+def unknown_flag(arguments: Iterable[str], known: Collection[str]) -> str:
+    """The line about the first flag that is not `known`; empty if all are."""
+    both = {*known, *(f"--no-{name.removeprefix('--')}" for name in known), "--help", "--debug"}
+    given = [word.partition("=")[0].replace("_", "-") for word in arguments if word.startswith("--") and word != "--"]
+    unknown = [word for word in given if word not in both]
+    return _unknown(unknown[0], known) if unknown else ""
+
+
+def _unknown(word: str, known: Iterable[str]) -> str:
+    """A line about an unknown word, with the known words that are nearest."""
+    close = difflib.get_close_matches(word, known, 3)
+    likeness = [difflib.SequenceMatcher(None, one, word).ratio() for one in close]
+    nearest = [one for one, ratio in zip(close, likeness, strict=True) if ratio == max(likeness)]
     kind = "flag" if word.startswith("-") else "word"
-    return f"unknown {kind} {word}" + (f"; did you mean {nearest}?" if nearest else "")
+    return f"unknown {kind} {word}" + (f"; did you mean {' or '.join(nearest)}?" if nearest else "")
 
 
 def flags(command: Any) -> list[str]:

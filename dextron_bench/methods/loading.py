@@ -31,9 +31,9 @@ def installed_methods() -> tuple[str, ...]:
 
 
 def load_class(spec: AgentSpec) -> Any:
-    """What a spec of kind method, module or file names; None if its module has no such name.
+    """What a spec of kind method, module or file names.
 
-    Raises UnknownMethod if no such method is installed, the import fails, or the spec is of another kind.
+    Raises UnknownMethod if there is no such method or name, the import fails, or the spec is of another kind.
     """
     if spec.kind == "method":
         return _load_installed(spec.name)
@@ -43,7 +43,11 @@ def load_class(spec: AgentSpec) -> Any:
         module = _import(str(spec), lambda: _module_of_file(spec))
     else:
         raise UnknownMethod(f"{str(spec)!r} is a {spec.kind}, not a method; {_choices()}")
-    return getattr(module, spec.name, None)
+    if not hasattr(module, spec.name):
+        classes = [name for name, value in vars(module).items() if isinstance(value, type) and hasattr(value, "name")]
+        instead = f"; it has {', '.join(classes)}" if classes else ""
+        raise UnknownMethod(f"method {str(spec)!r}: {spec.location} has no class {spec.name!r}{instead}")
+    return getattr(module, spec.name)
 
 
 def class_origin(cls: type) -> dict[str, str | None]:

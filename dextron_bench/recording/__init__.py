@@ -8,7 +8,7 @@ from dextron_bench.recording.live_view import LiveView, open_live_viewer
 from dextron_bench.recording.pair import UnequalSettings, write_pair
 from dextron_bench.recording.rrd_file import UnwritableRecording
 from dextron_bench.recording.summaries import ReaderError, Summary, read_safely, read_screened, screen, summarise
-from dextron_bench.recording.viewer import ViewerError, screenshots, view
+from dextron_bench.recording.viewer import ViewerError, require_screen, screenshots, view
 from dextron_bench.recording.web_viewer import web_viewer_files
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "read",
     "read_safely",
     "read_screened",
+    "require_screen",
     "screen",
     "screenshots",
     "summarise",

@@ -17,6 +17,7 @@ from typing import IO
 from rerun.experimental import ViewerClient
 
 LOOPBACK = "127.0.0.1"
+HEADLESS = "--headless"  # A viewer without a window.
 START_TIMEOUT = 60.0  # [s] in which a viewer must start.
 NOTICE_TIME = 8.0  # [s] after which the viewer no longer shows its notices.
 DRAW_TIME = 1.5  # [s] in which the viewer draws a new step.
@@ -24,6 +25,16 @@ DRAW_TIME = 1.5  # [s] in which the viewer draws a new step.
 
 class ViewerError(RuntimeError):
     """Rerun's viewer cannot run."""
+
+
+class NoScreen(ViewerError):
+    """The native viewer needs a screen."""
+
+
+def require_screen() -> None:
+    """Raises NoScreen on Linux without a display."""
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise NoScreen("there is no screen for the native viewer; `browse --web` opens recordings in the browser")
 
 
 def view(files: Sequence[Path]) -> None:
@@ -49,7 +60,7 @@ def screenshots(file: Path, pictures: Mapping[int, Path], width: int = 1600, hei
     """
     _require([file])
     port = free_port()
-    window = ["--headless", "--window-size", f"{width}x{height}", "--hide-welcome-screen", "--port", str(port)]
+    window = [HEADLESS, "--window-size", f"{width}x{height}", "--hide-welcome-screen", "--port", str(port)]
     with TemporaryFile() as logs, viewer_process(window, logs) as process:
         try:
             client = ViewerClient.connect(address(port, process))
@@ -74,7 +85,12 @@ def _require(files: Sequence[Path]) -> None:
 
 @contextmanager
 def viewer_process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
-    """Runs a viewer process; the end of the block ends it and its children."""
+    """Runs a viewer process; the end of the block ends it and its children.
+
+    Raises NoScreen if it would open a window where there is no screen.
+    """
+    if logs is None and HEADLESS not in arguments:
+        require_screen()
     command = [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *arguments]
     environment = {"WGPU_BACKEND": "vulkan", **os.environ} if logs else None
     process = subprocess.Popen(command, env=environment, stdout=logs, stderr=logs, start_new_session=True)

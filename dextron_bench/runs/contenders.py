@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from dextron_bench.runs import plans, result_files
 from dextron_bench.runs.in_order import FOLDER, PlayedScores, ScoresInOrder, StoredScores
 from dextron_bench.runs.plans import Plan, Run
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import provenance
+from dextron_bench.storage import provenance, schemas
 from dextron_bench.world import model
 
 
@@ -29,6 +30,8 @@ def open_scores(name: str, split: Split, runs: Path, seeds: Sequence[int] = (), 
     Raises OtherSource, the errors of `plans.resolve`, MissingWeights, FolderMismatch.
     """
     stored = _stored(name, split, runs)
+    if stored is None and ":" in name:
+        stored = _stored_of_agent(name, split, runs)
     if stored is not None:
         return StoredScores(name, stored, split)
     resolved = [plans.beside_other_code(run, runs / FOLDER) for run in _agents(name, split, seeds)]
@@ -43,6 +46,25 @@ def _stored(name: str, split: Split, runs: Path) -> np.ndarray | None:
         results = result_files.find(name, runs, split.name)
     except result_files.UnknownResult:
         return None
+    return _scores(results, split)
+
+
+def _stored_of_agent(name: str, split: Split, runs: Path) -> np.ndarray | None:
+    """The scores in finished runs of the agent module:Class or file.py:Class, if they were made by its present code."""
+    run = plans.resolve(Plan(name, split.reaches, (split.name,)))
+    if run.learner is not None or run.source != split.reaches:
+        return None
+    label, code = plans.beside_other_code(run, runs).label, run.config()["code"]
+    folders = [
+        folder
+        for folder in result_files.finished(runs, label)
+        if schemas.read(folder.config, schemas.CONFIG).get("code") == code
+    ]
+    return _scores([result_files.read_result(folder.result) for folder in folders], split)
+
+
+def _scores(results: Iterable[dict[str, Any]], split: Split) -> np.ndarray | None:
+    """The scores (seeds, rows) in results on this version of the split and this physics; None if there are none."""
     scores = [
         result["splits"][split.name]["scores"]
         for result in results

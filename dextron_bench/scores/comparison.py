@@ -157,9 +157,7 @@ def align(
 def _seed_scores(name: str, results: Results, reaches: str, split: str) -> SeedScores:
     seeds = [result for result in results if result["reaches"] == reaches]
     if without_split := [result for result in seeds if split not in result["splits"]]:
-        advice = (
-            "; play it, or give the path of other results, such as leaderboard/results/" + without_split[0]["method"]
-        )
+        advice = "; play it, or give the path of other results"
         if without_split != seeds:
             advice = "; other seeds have it: to compare one of them, give its folder"
         raise Incomparable(

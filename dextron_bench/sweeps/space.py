@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+DIGITS = 4  # Of a number that is drawn from a range.
+
 
 class BadSpace(ValueError):
     """Values or a range that a setting cannot have."""
@@ -57,12 +59,12 @@ class Range:
         return isinstance(self.low, int) and isinstance(self.high, int)
 
     def draw(self, rng: np.random.Generator) -> float:
-        """A number of the range."""
+        """A number of the range, with DIGITS digits: readable, and a name of its own for each run."""
         if self.is_whole and not self.log:
             return int(rng.integers(int(self.low), int(self.high), endpoint=True))
         low, high = (self.low - 0.5, self.high + 0.5) if self.is_whole else (self.low, self.high)
         number = float(np.exp(rng.uniform(np.log(low), np.log(high)))) if self.log else float(rng.uniform(low, high))
-        number = min(max(number, self.low), self.high)  # Rounding may leave the range.
+        number = min(max(float(f"{number:.{DIGITS}g}"), self.low), self.high)  # Rounding may leave the range.
         return round(number) if self.is_whole else number
 
 

@@ -54,10 +54,10 @@ def test_the_address_has_the_expression(
 
 
 def test_the_native_viewer_needs_a_screen(here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]):
-    monkeypatch.setattr(browse.sys, "platform", "linux")
+    monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    assert "--web opens recordings in the browser" in complaint("browse")
+    assert "`browse --web` opens recordings in the browser" in complaint("browse")
 
 
 def test_a_viewer_that_ends_at_once_is_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):

@@ -70,6 +70,7 @@ def test_without_a_terminal_a_line_each_minute_says_what_is_done_and_left(
     """100 of 400 were done before; then 20 in the first two minutes: 10 a minute, so 280 take 28 minutes."""
     now = 1000.0
     monkeypatch.setattr(output.time, "monotonic", lambda: now)
+    monkeypatch.setattr(output._Lines, "printed", None)
     with output.progress_bar("rows") as progress:
         progress(100, 400)
         for at, done in (*((1030.0, 105), (1059.0, 109), (1120.0, 120)), *((1150.0, 125), (1180.0, 130))):
@@ -81,8 +82,23 @@ def test_without_a_terminal_a_line_each_minute_says_what_is_done_and_left(
     assert capsys.readouterr() == (
         "",
         "rows: 120/400, 0.17/s, 28 min left, val 3.1\nrows: 130/400, 0.17/s, 27 min left, val 3.1\n"
-        "rows: 60/400, 1/s, 5 min left\n",
+        "rows: 0/400\nrows: 60/400, 1/s, 5 min left\n",
     )
+
+
+def test_short_pieces_of_work_have_a_line_each_minute_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
+    """Four bars of 25 s each: the third begins 50 s after the first, and prints at 75 s."""
+    now = 1000.0
+    monkeypatch.setattr(output.time, "monotonic", lambda: now)
+    monkeypatch.setattr(output._Lines, "printed", None)
+    for bar in range(4):
+        with output.progress_bar(f"piece {bar}") as progress:
+            progress(0, 10)
+            now += 25.0
+            progress(10, 10)
+    assert capsys.readouterr().err == "piece 2: 10/10, 0.4/s, 0 s left\n"
 
 
 def test_a_duration_has_two_units_at_most():
