@@ -22,6 +22,7 @@ from dextron_bench.training.jobs import TrainingJob
 from dextron_bench.training.learning_curve import POINT_ROWS
 
 TIMED = 32  # Episodes that are played to measure the time of one.
+SHORT = 5  # Epochs of a timing run at most; a longer one would take as long as the training.
 
 
 def estimate(
@@ -57,12 +58,12 @@ def seconds_per_episode(reaches: str, threads: int) -> float:
 
 
 def _training(job: TrainingJob, seeds: tuple[int, ...], folder: Path) -> dict[str, Any]:
-    """The row of a training."""
+    """The row of a training; its time is unknown before the first epoch if its timing run is long."""
     learner = job.learner
     progress = Checkpoints(folder, seeds).progress()
     left = learner.epochs - (progress.epoch if progress else 0)
     seconds = timing.seconds_left(folder, left, learner.period)
-    if seconds is None:
+    if seconds is None and learner.timing_run.epochs <= SHORT:
         rows = min(POINT_ROWS, len(load_split(job.reaches, "val").cases)) * math.ceil(left / learner.period)
         seconds = left * loop.seconds_per_epoch(learner, job.track(), seeds)
         seconds += rows * len(seeds) * seconds_per_episode(job.reaches, job.threads)
