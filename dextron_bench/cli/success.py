@@ -95,7 +95,7 @@ class Data:
 
 @dataclass(frozen=True)
 class Train:
-    """Train the success model on a data set of `success data`; a fifth of the episodes is held out.
+    """Train the success model on a data set of `success data`; a fifth of the settings is held out.
 
     If it is interrupted, the same command continues and gives the same bytes.
 

@@ -5,6 +5,7 @@ The arrays stay on the disk, so memory grows with the number of episodes and not
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from dextron_bench.world import model
 
 CONFIG = "search.json"  # In the folder of a data set: its config (under "search") and the hash of the physics.
 REMEDY = "remove it, and run the same `dextron-bench success data` again"
-TEST_EVERY = 5  # One episode in five of each block is for testing: 80 % and 20 % of the episodes (paper, II.E).
+TEST_EVERY = 5  # One setting in five is for testing, with all of its episodes: 80 % and 20 % (paper, II.E).
 
 
 class EmptyDataset(LookupError):
@@ -28,7 +29,10 @@ class BadDataset(ValueError):
 
 
 class Dataset:
-    """The transitions of the training episodes in a folder (four in five), or of its test episodes, counted from 0."""
+    """The transitions of the training episodes in a folder, or of its test episodes, counted from 0.
+
+    All episodes of a setting are on one side, since a model that knows a setting knows how its other episodes end.
+    """
 
     def __init__(self, folder: Path, test: bool = False) -> None:
         """Opens the training episodes, or with `test` the test episodes. Raises EmptyDataset, BadDataset."""
@@ -43,7 +47,12 @@ class Dataset:
                 f"all episodes in {folder} have the same outcome, so there is nothing to learn from them; "
                 "run `dextron-bench success data` with more --rows"
             )
-        is_test = [np.arange(len(block["solved"])) % TEST_EVERY == TEST_EVERY - 1 for block in self._blocks]
+        is_test = _held_out([block["states"][block["starts"][:-1]] for block in self._blocks])
+        if test and not any(mask.any() for mask in is_test):
+            raise BadDataset(
+                f"the episodes in {folder} have fewer than {TEST_EVERY} settings, so none can be held out; "
+                "run `dextron-bench success data` with more --rows"
+            )
         pairs = [(block, mask == test) for block, mask in zip(self._blocks, is_test, strict=True)]
         self._block_numbers = np.repeat(np.arange(len(files)), [mask.sum() for _, mask in pairs])
         self._first_rows = np.concatenate([block["starts"][:-1][mask] for block, mask in pairs])
@@ -69,6 +78,18 @@ class Dataset:
         if (bad := ~(np.isfinite(states).all(axis=1) & np.isfinite(actions))).any():
             raise _damaged(self._files[numbers[bad][0]], "holds numbers that are not finite")
         return states, actions, self._solved[episodes].astype(np.int64)
+
+
+def _held_out(first_states: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """For the first states (E, 48) of the episodes of each block: which of them (E,) are for testing.
+
+    Settings have different first states. They count in the order in which they appear, so later blocks change nothing.
+    """
+    states = np.concatenate(first_states)
+    _, appears, setting = np.unique(states, axis=0, return_index=True, return_inverse=True)
+    number = np.argsort(np.argsort(appears))[setting.reshape(-1)]
+    ends = np.cumsum([len(block) for block in first_states])
+    return np.split(number % TEST_EVERY == TEST_EVERY - 1, ends[:-1])
 
 
 def open_block(file: Path) -> dict[str, np.ndarray]:

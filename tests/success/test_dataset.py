@@ -19,7 +19,7 @@ def write_block(folder: Path, number: int, lengths: list[int], solved: list[int]
     tensors.write(block_file(folder, number), arrays | {"solved": np.array(solved, np.uint8)}, {})
 
 
-def test_every_fifth_episode_is_for_testing_and_rows_keep_their_outcome(tmp_path: Path):
+def test_every_fifth_setting_is_for_testing_and_rows_keep_their_outcome(tmp_path: Path):
     write_block(tmp_path, 0, [2, 1, 1, 1, 3], [1, 0, 0, 0, 1])
     write_block(tmp_path, 1, [1, 2], [0, 1])
     train, test = Dataset(tmp_path), Dataset(tmp_path, test=True)
@@ -31,6 +31,26 @@ def test_every_fifth_episode_is_for_testing_and_rows_keep_their_outcome(tmp_path
     states, _, outcomes = test.take(np.array([2, 0]))
     assert states[:, 0].tolist() == [7, 5]
     assert outcomes.tolist() == [1, 1]
+
+
+def test_all_episodes_of_a_setting_are_on_one_side(tmp_path: Path):
+    """Settings a to f appear in the order a b a c d | e b e f: the fifth is e, with both of its episodes."""
+    for number, first in enumerate(([1, 2, 1, 3, 4], [5, 2, 5, 6])):
+        states = np.tile(np.float32(first)[:, None], 48)
+        arrays = {"states": states, "actions": np.arange(len(first), dtype=np.float32) + 10 * number}
+        solved = np.arange(len(first), dtype=np.uint8) % 2
+        tensors.write(
+            block_file(tmp_path, number), arrays | {"starts": np.arange(len(first) + 1), "solved": solved}, {}
+        )
+    train, test = Dataset(tmp_path), Dataset(tmp_path, test=True)
+    assert test.take(np.arange(len(test)))[1].tolist() == [10, 12]
+    assert train.take(np.arange(len(train)))[1].tolist() == [0, 1, 2, 3, 4, 11, 13]
+
+
+def test_a_data_set_with_few_settings_is_refused(tmp_path: Path):
+    write_block(tmp_path, 0, [1, 1, 1, 1], [0, 1, 0, 1])
+    with pytest.raises(BadDataset, match="have fewer than 5 settings, so none can be held out"):
+        Dataset(tmp_path, test=True)
 
 
 def test_a_folder_without_a_usable_data_set_is_refused(tmp_path: Path):
