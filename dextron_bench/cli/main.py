@@ -141,7 +141,7 @@ def _command(commands: Mapping[str, type[Command] | Group], arguments: Sequence[
     return _command(command[1], arguments[1:]) if isinstance(command, tuple) else command
 
 
-def _union(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str]) -> Any:
+def _union(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str] = ()) -> Any:
     """The table of commands as the union type that tyro turns into subcommands.
 
     The help of the table has the first paragraph of each command, and a command's own help has all of it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -153,8 +154,8 @@ class Export:
 
 
 def _remove_if_empty(folder: Path) -> None:
-    """Removes the folder of a label that has no runs any more."""
-    if not any(folder.iterdir()):
+    """Removes the folder of a label, unless it has other runs."""
+    with suppress(OSError):
         folder.rmdir()
 
 
