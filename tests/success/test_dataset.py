@@ -36,7 +36,7 @@ def test_every_fifth_setting_is_for_testing_and_rows_keep_their_outcome(tmp_path
 def test_all_episodes_of_a_setting_are_on_one_side(tmp_path: Path):
     """Settings a to f appear in the order a b a c d | e b e f: the fifth is e, with both of its episodes."""
     for number, first in enumerate(([1, 2, 1, 3, 4], [5, 2, 5, 6])):
-        states = np.tile(np.float32(first)[:, None], 48)
+        states = np.tile(np.array(first, np.float32)[:, None], 48)
         arrays = {"states": states, "actions": np.arange(len(first), dtype=np.float32) + 10 * number}
         solved = np.arange(len(first), dtype=np.uint8) % 2
         tensors.write(
