@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import re
+import typing
 from collections.abc import Collection, Iterable
 from itertools import groupby
 from typing import Any
@@ -66,10 +67,18 @@ def _unknown(word: str, known: Iterable[str]) -> str:
 
 
 def flags(command: Any) -> list[str]:
-    """The flags of a command, and of the settings of its method if it has such."""
+    """The flags of a command, of the dataclasses among its fields, and of the settings of its method."""
     if not dataclasses.is_dataclass(command):
         return []
-    names = [field.name for field in dataclasses.fields(command)]
-    settings = next((field.default_factory for field in dataclasses.fields(command) if field.name == FIELD), None)
-    own_flags = [f"--{name.replace('_', '-')}" for name in names if name != FIELD]
-    return own_flags + (flags(settings) if settings is not None else [])
+    hints = typing.get_type_hints(command, include_extras=True)
+    return [flag for field in dataclasses.fields(command) for flag in _flags_of(field, hints[field.name])]
+
+
+def _flags_of(field: dataclasses.Field[Any], hint: Any) -> list[str]:
+    """The flags of a field; a field can have another name on the command line, which its type hint holds."""
+    if field.name == FIELD:
+        return flags(field.default_factory)
+    if dataclasses.is_dataclass(inner := getattr(hint, "__origin__", hint)):
+        return flags(inner)
+    names = [name for part in getattr(hint, "__metadata__", ()) if (name := getattr(part, "name", None))]
+    return [f"--{name.replace('_', '-')}" for name in names or [field.name]]

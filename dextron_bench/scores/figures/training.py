@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dextron_bench.scores.cells import counted
@@ -46,14 +47,21 @@ def learning_curves(
     axes.set_title("Return on 50 settings of val" + (": median over seeds, and each seed" if with_spread else ""))
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
     panels = [panel for part in parts[1:] for panel in part.subplots(1, PANELS)]
-    for panel in panels[len(with_spread) :]:
+    _draw_seeds(panels, {label: tables[label] for label in with_spread}, colours, axes)
+    save(figure, file, 150)
+
+
+def _draw_seeds(
+    panels: Sequence[Axes], tables: Mapping[str, pd.DataFrame], colours: Mapping[str, str], overview: Axes
+) -> None:
+    """Draws each seed of each method, a method in a panel, and removes the panels that are left."""
+    for panel in panels[len(tables) :]:
         panel.remove()
-    for panel, label in zip(panels, with_spread, strict=False):
-        panel.plot(tables[label].index, tables[label], color=colours[label], linewidth=0.7)
-        panel.set(ylim=LIMITS, yticks=(0, 10, 20), xlim=axes.get_xlim(), xticks=axes.get_xticks()[::2][:-1])
+    for panel, (label, table) in zip(panels, tables.items(), strict=False):
+        panel.plot(table.index, table, color=colours[label], linewidth=0.7)
+        panel.set(ylim=LIMITS, yticks=(0, 10, 20), xlim=overview.get_xlim(), xticks=overview.get_xticks()[::2][:-1])
         panel.set_title(label, fontsize=9)
         panel.tick_params(labelsize=8)
-    save(figure, file, 150)
 
 
 def _by_seed(points: Mapping[int, pd.DataFrame]) -> pd.DataFrame:
