@@ -132,7 +132,7 @@ def _print(comparison: Comparison) -> None:
     _print_scores(comparison)
     _print_flips(comparison.flips, comparison.a.scores.shape[1])
     p_value = cells.p_value(comparison.p_value)
-    print(f"McNemar's exact test: p {p_value if p_value.startswith('<') else f'= {p_value}'}")
+    print(f"McNemar's exact test: p {p_value.replace('<', '< ') if '<' in p_value else f'= {p_value}'}")
     rows = [
         [
             row["group"],
