@@ -122,14 +122,15 @@ class Add:
 
     def __call__(self) -> int:
         from dextron_bench.leaderboard import add
+        from dextron_bench.leaderboard.submission.bundle import AGENT
 
         with unpacked(self.bundle) as opened:
-            manifest = opened[1]
+            folder, manifest = opened
             add.check_name(manifest["name"], manifest["reaches"], self.board, self.replace)
             verdict = _verify(opened, self)
             code = print_verdict(verdict)
             if verdict.passed:
-                print(*add.merge(verdict, self.board), sep="\n")
+                print(*add.merge(verdict, self.board, folder / AGENT), sep="\n")
         return code
 
 

@@ -1,11 +1,11 @@
-"""Adds verified submissions to the board: their results, and the episodes that reproduce them."""
+"""Adds verified submissions to the board: results, episodes that reproduce them, code, and recordings."""
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
 
-from dextron_bench.leaderboard import build, collect
+from dextron_bench.leaderboard import build, collect, highlights
 from dextron_bench.leaderboard.submission import bundle, names
 from dextron_bench.leaderboard.submission.entry import BadSubmission
 from dextron_bench.leaderboard.submission.verdict import Verdict
@@ -30,20 +30,26 @@ def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:
         raise BadSubmission(f"{name!r} on {reaches} reaches is on the board; --replace replaces it")
 
 
-def merge(verdict: Verdict, board: Path) -> list[Path]:
+def merge(verdict: Verdict, board: Path, agent: Path) -> list[Path]:
     """Puts a verified submission on the board and builds its tables and page; returns the files that were built.
+
+    `agent` is the folder with the agent's own files; the board keeps a copy. A success and a failure of the submission
+    are recorded beside the board, from its actions, not from its own recordings.
 
     Results, tables and page change together in one step: whoever reads the board sees it before or after, and if the
     submission breaks the page, or the process dies, it stays as it was. Raises FolderBusy.
     """
     with folders.replacing(board) as part:
-        _put(verdict, part)
+        manifest, place = verdict.manifest, _put(verdict, part)
+        if agent.is_dir():
+            shutil.copytree(agent, place / bundle.AGENT)
+        highlights.record_outcomes(place, manifest["name"], manifest["reaches"], part.parent / highlights.FOLDER)
         built = [board / file.relative_to(part) for file in build.build(part)]
     return built
 
 
-def _put(verdict: Verdict, board: Path) -> None:
-    """Writes the results, tables and manifest of a submission into the results of a board that nobody reads yet."""
+def _put(verdict: Verdict, board: Path) -> Path:
+    """Writes results, tables and manifest of a submission into a board that nobody reads yet; returns their folder."""
     manifest = verdict.manifest
     place = board / collect.RESULTS / manifest["name"] / manifest["reaches"]
     shutil.rmtree(place, ignore_errors=True)
@@ -55,3 +61,4 @@ def _put(verdict: Verdict, board: Path) -> None:
             tables.write(run.fresh, verdict.fresh[seed])
         atomic.write_json(run.result, {**result, "tier": verdict.tier})
     atomic.write_json(place / bundle.MANIFEST, manifest)
+    return place

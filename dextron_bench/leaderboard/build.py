@@ -11,9 +11,11 @@ import pandas as pd
 
 from dextron_bench.leaderboard import readme
 from dextron_bench.leaderboard.collect import RESULTS
+from dextron_bench.leaderboard.submission.bundle import AGENT
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
 from dextron_bench.storage import atomic, provenance, schemas
+from dextron_bench.storage.folders import visible
 from dextron_bench.storage.printable import spreadsheet_cell
 from dextron_bench.storage.run_folder import run_folders
 from dextron_bench.world import model
@@ -49,7 +51,7 @@ def build(board: Path) -> list[Path]:
         files.append(board / readme.picture(reaches))
         training.learning_curves(by_method, rows[rows["reaches"] == reaches], files[-1])
     files.append(board / page.FILE)
-    text = page.document(rows, results, curves, board.resolve().parent / FOLDER)
+    text = page.document(rows, results, curves, board.resolve().parent / FOLDER, _code_of_submissions(board))
     atomic.write_atomically(files[-1], lambda part: part.write_text(text, encoding="utf-8"))
     return files
 
@@ -73,6 +75,14 @@ def _with_origin(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.Da
 
     ranked_entries = [entry for entry in entries(rows, results) if entry.tier != QUOTED]
     return rows.assign(**{name: [getattr(entry, name) for entry in ranked_entries] for name in ORIGIN})
+
+
+def _code_of_submissions(board: Path) -> dict[tuple[str, str], list[str]]:
+    """The paths from a leaderboard's folder to the files of its agents, by method and source of reaches."""
+    code: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for file in visible(board, f"{RESULTS}/*/*/{AGENT}/*"):
+        code[file.parts[-4], file.parts[-3]].append(file.relative_to(board).as_posix())
+    return code
 
 
 def _curves_by_source(runs: Path) -> dict[str, dict[str, Curves]]:

@@ -17,9 +17,10 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import from_frame
 from dextron_bench.recording import Recording, read_safely, summarise
 from dextron_bench.runs import rerecording, selection
-from dextron_bench.splits.loading import Split, known_splits, load_split
+from dextron_bench.splits.loading import Split, known_splits, load_split, ranking_splits
 from dextron_bench.storage import atomic
 from dextron_bench.storage.folders import visible
+from dextron_bench.storage.run_folder import seed_folders
 from dextron_bench.success import exemplars, network
 from dextron_bench.success.exemplars import EXPERT, PredictedEpisode
 
@@ -68,6 +69,24 @@ def choose(runs: Path, reaches: Sequence[str], split: str, rows: int) -> pd.Data
     by_source = {name: table[table["reaches"] == name] for name in reaches}
     cases = [case for name, group in by_source.items() if len(group) for case in _exemplars(group, name, split)]
     return pd.concat([*_shortest(table), *cases], ignore_index=True).drop_duplicates("name")
+
+
+def record_outcomes(run: Path, name: str, reaches: str, into: Path) -> list[Path]:
+    """Records the shortest success and the shortest failure of a submission on its first split, at its lowest seed.
+
+    `run` is the folder of its seeds, without recordings. Older recordings of its `name` are removed. Raises
+    MissingData.
+    """
+    for outcome in OUTCOMES:
+        (into / f"{name}-{outcome}.rrd").unlink(missing_ok=True)
+    table = selection.episodes([run])
+    table = table[(table["split"] == ranking_splits(reaches)[0]) & (table["length"] > 0)]
+    table = table[table["seed"] == table["seed"].min()]
+    files = make(pd.concat([*_shortest(table)]), into) if len(table) else []
+    for seed in seed_folders(run):
+        shutil.rmtree(seed.recordings, ignore_errors=True)
+        seed.manifest.unlink(missing_ok=True)
+    return files
 
 
 def make(chosen: pd.DataFrame, into: Path) -> list[Path]:

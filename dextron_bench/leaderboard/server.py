@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.leaderboard.highlights import FOLDER
 from dextron_bench.leaderboard.local_server import (
     LocalServer,
@@ -16,9 +17,11 @@ from dextron_bench.leaderboard.local_server import (
     viewer_link,
 )
 from dextron_bench.leaderboard.page import FILE
+from dextron_bench.leaderboard.submission.bundle import AGENT
 
 RECORDING = re.compile(rf"/{FOLDER}/([A-Za-z0-9][A-Za-z0-9._+-]*\.rrd)")
 LINK = re.compile(rf'href="\.\./{FOLDER}/([A-Za-z0-9._+%-]+\.rrd)"')
+CODE = re.compile(rf"/{RESULTS}/([A-Za-z0-9][\w.+-]*)/([a-z]+)/{AGENT}/([A-Za-z0-9][\w.+-]*)", re.ASCII)
 TABLES = {"table.csv": "text/csv; charset=utf-8", "table.json": "application/json"}
 
 
@@ -42,6 +45,10 @@ class Site:
             return file_response(self.board / path[1:], TABLES[path[1:]])
         if match := RECORDING.fullmatch(path):
             return file_response(self.board.resolve().parent / FOLDER / match[1], "application/octet-stream")
+        if match := CODE.fullmatch(path):
+            # Text, so that no browser runs what a stranger wrote.
+            file = self.board / RESULTS / match[1] / match[2] / AGENT / match[3]
+            return file_response(file, "text/plain" if file.suffix == ".py" else "application/octet-stream")
         return viewer_file(self.viewer, path)
 
     def _page(self, host: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import filecmp
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,7 +18,7 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage import atomic, hashing, schemas
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder, seed_folders
@@ -108,7 +108,8 @@ def _replay(row: Row, threads: int, report: Progress) -> Finding:
     claims = [row.result.get(name) for name in ("method", "reaches", "declared")]
     if claims != [manifest.get(name) for name in ("name", "reaches", "declared")]:
         return Finding("", ["its name, reaches or declarations differ from its manifest"])
-    if problem := _misplaced(row, [f"seed{seed}" for seed in manifest.get("seeds", [])]):
+    problem = _misplaced(row, [f"seed{seed}" for seed in manifest.get("seeds", [])])
+    if problem := problem or _other_code(row.run.path.parent, manifest["files"]):
         return Finding("", [problem])
     if result_files.scores_by_split(replayed.rows) != row.result["splits"]:
         return Finding("", ["its result differs from its actions, played again", *replayed.differing[:5]])
@@ -122,6 +123,14 @@ def _misplaced(row: Row, seeds: Sequence[str]) -> str:
         return f"lies in {row.run.identity}, but is of {row.name}"
     present = sorted(run.path.name for run in seed_folders(row.run.path.parent))
     return "" if present == sorted(seeds) else f"has {', '.join(present)}, but its manifest has {', '.join(seeds)}"
+
+
+def _other_code(place: Path, hashes: Mapping[str, str]) -> str:
+    """Which of the agent's files on the board differs from its manifest; empty if none does."""
+    kept = {str(file.relative_to(place)): hashing.sha256(file) for file in visible(place, f"{bundle.AGENT}/*")}
+    listed = {name: value for name, value in hashes.items() if name.startswith(f"{bundle.AGENT}/")}
+    differing = sorted(name for name in kept | listed if kept.get(name) != listed.get(name))
+    return f"its manifest lists another {differing[0]}" if differing else ""
 
 
 def _same(file: Path, other: Path) -> bool:

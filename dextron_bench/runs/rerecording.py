@@ -14,9 +14,9 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import from_frame
-from dextron_bench.runs import recording_files, selection
+from dextron_bench.runs import recording_files, result_files, selection
 from dextron_bench.splits.loading import load_split
-from dextron_bench.storage import schemas
+from dextron_bench.storage import provenance, schemas
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
@@ -72,10 +72,17 @@ def _check_playable(row: dict[Any, Any], fault: str) -> None:
             f"{name} {problem}, and its actions were not kept; remove {run.episodes} and {advice}: "
             "it plays the episodes again and trains nothing"
         )
-    if schemas.read(run.config, schemas.CONFIG).get("physics") != model.mjcf_hash():
+    if _physics(run) != model.mjcf_hash():
         raise Unplayable(f"{name} was played with other physics than this version's; remove {run.path} and {advice}")
     if load_split(row["reaches"], row["split"]).digest != row["digest"]:
         raise Unplayable(f"{name} is of an older version of the split; {advice}")
+
+
+def _physics(run: RunFolder) -> str:
+    """The hash of the physics of a run; on a leaderboard, the result has it."""
+    if run.config.exists():
+        return str(schemas.read(run.config, schemas.CONFIG).get("physics"))
+    return provenance.physics_of(result_files.read_result(run.result))
 
 
 def _record(group: pd.DataFrame) -> Iterator[None]:

@@ -75,6 +75,21 @@ def test_the_page_and_recordings_are_served(
     assert "connect-src 'self'" in answer.headers["Content-Security-Policy"]
 
 
+def test_code_of_submissions_is_served_as_text_and_nothing_else_of_the_results(
+    server: leaderboard_server.Server, ask: Callable[..., tuple[HTTPResponse, bytes]]
+):
+    place = server.site.board / "results/a+b/synthetic"
+    (place / "agent").mkdir(parents=True)
+    (place / "agent/mine.py").write_text("<script>")
+    (place / "bundle.json").write_text("{}")
+    (place / "agent/link.py").symlink_to(place / "bundle.json")
+    answer, body = ask("/results/a%2Bb/synthetic/agent/mine.py")
+    assert (answer.headers["Content-Type"], body) == ("text/plain", b"<script>")
+    assert answer.headers["X-Content-Type-Options"] == "nosniff"
+    refused = ("bundle.json", "agent/", "agent/link.py", "agent/../bundle.json", "agent/..%2Fbundle.json")
+    assert [ask(f"/results/a+b/synthetic/{path}")[0].status for path in refused] == [404] * len(refused)
+
+
 def test_without_a_viewer_recordings_are_downloaded(
     server: leaderboard_server.Server, ask: Callable[..., tuple[HTTPResponse, bytes]]
 ):

@@ -17,6 +17,7 @@ from dextron_bench.leaderboard.page import sections, standings_table
 from dextron_bench.leaderboard.page.html import Html, join, tag
 from dextron_bench.leaderboard.page.rows import Entry, entries
 from dextron_bench.leaderboard.page.sections import Curves
+from dextron_bench.leaderboard.page.standings_table import Code
 from dextron_bench.splits.loading import SPLIT_NAMES
 from dextron_bench.splits.tracks import PLUS
 from dextron_bench.world import model
@@ -42,10 +43,13 @@ DESCRIPTIONS = {
 }
 
 
-def document(rows: pd.DataFrame, results: Iterable[dict[str, Any]], curves: Curves, recordings: Path) -> str:
+def document(
+    rows: pd.DataFrame, results: Iterable[dict[str, Any]], curves: Curves, recordings: Path, code: Code
+) -> str:
     """The page's HTML from the leaderboard's `rows` and a folder of recordings; equal results give equal bytes.
 
-    The page makes no request, and its content security policy allows only its own script. Raises BrokenRecording.
+    `code` holds the paths from the page to the files of submitted agents, by method and source of reaches. The page
+    makes no request, and its content security policy allows only its own script. Raises BrokenRecording.
     """
     results, shown = list(results), highlights.published(recordings)
     table_entries, script = entries(rows, results), _resource("page.js")
@@ -63,7 +67,7 @@ def document(rows: pd.DataFrame, results: Iterable[dict[str, Any]], curves: Curv
         "script": script,
         "facts": _facts(rows),
         "controls": _controls(table_entries),
-        "table": standings_table.table(table_entries, highlights.by_method(shown)),
+        "table": standings_table.table(table_entries, highlights.by_method(shown), code),
         "sections": join(*(_section(title, list(content)) for title, content in contents.items())),
     }
     return Template(_resource("page.html")).substitute(values)

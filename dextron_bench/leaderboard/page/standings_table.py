@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import quote
 
 from dextron_bench.leaderboard.highlights import Shown
 from dextron_bench.leaderboard.page import svg
@@ -13,7 +14,8 @@ from dextron_bench.leaderboard.page.rows import QUOTED, Entry
 from dextron_bench.scores import cells
 
 Links = Mapping[str, Sequence[Shown]]
-OPTIONAL = ("rank", "iqm", "regret", "fresh")  # Columns that appear only if some row has them.
+Code = Mapping[tuple[str, str], Sequence[str]]  # Paths from the page, by method and source of reaches.
+OPTIONAL = ("rank", "iqm", "regret", "fresh", "code")  # Columns that appear only if some row has them.
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,17 +29,17 @@ class Column:
     hint: str | None = None
 
 
-def table(entries: Sequence[Entry], links: Links) -> Html:
+def table(entries: Sequence[Entry], links: Links, code: Code) -> Html:
     """The whole table in the order of the entries; readable without a script."""
     known = {name for entry in entries for name, value in entry.scores.items() if value == value}
-    columns = _columns(known, links)
+    columns = _columns(known | ({"code"} if code else set()), links, code)
     head = tag("thead", tag("tr", *(_heading(column) for column in columns)))
     body = tag("tbody", *(_row(entry, columns) for entry in entries))
     caption = "Scores of methods by source of reaches and split, with 95 % intervals. Click a heading to sort."
     return tag("table", tag("caption", caption, class_="unseen"), head, body, id="standings")
 
 
-def _columns(names: set[str], links: Links) -> list[Column]:
+def _columns(names: set[str], links: Links, code: Code) -> list[Column]:
     columns = [
         Column("rank", _score("rank"), lambda entry: cells.rank(entry.scores) or UNKNOWN, True, "ties share a rank"),
         Column("method", lambda entry: entry.method.lower(), _method),
@@ -57,6 +59,7 @@ def _columns(names: set[str], links: Links) -> list[Column]:
         Column("wall time", lambda entry: entry.seconds, _wall_time, True, "and hardware"),
         Column("privileged", lambda entry: entry.privileged, _privileged, False, "access declared"),
         Column("recordings", lambda entry: len(links.get(entry.method, ())), lambda entry: _links(entry, links), True),
+        Column("code", lambda entry: len(_files(entry, code)), lambda entry: _code(entry, code), False, "submitted"),
     ]
     return [column for column in columns if column.title.lower() in names or column.title.lower() not in OPTIONAL]
 
@@ -156,3 +159,14 @@ def _links(entry: Entry, links: Links) -> str | Html:
     others = "".join(dict.fromkeys(recording.reaches for recording in shown if recording.reaches != entry.reaches))
     note = tag("small", f"on {others} reaches") if others else None
     return join(*(tag("a", recording.kind, href=recording.address) for recording in shown), note)
+
+
+def _files(entry: Entry, code: Code) -> Sequence[str]:
+    """The paths from the page to the files of a submission's agent."""
+    return code.get((entry.method, entry.reaches), ()) if entry.tier != QUOTED else ()
+
+
+def _code(entry: Entry, code: Code) -> str | Html:
+    """Links to the files of a submission's agent."""
+    files = _files(entry, code)
+    return join(*(tag("a", file.rpartition("/")[2], href=quote(file)) for file in files)) if files else UNKNOWN

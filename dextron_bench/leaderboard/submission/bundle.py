@@ -29,6 +29,7 @@ from dextron_bench.storage.run_folder import RunFolder
 FORMAT = 1
 MOST_SEEDS = 10
 MANIFEST = "bundle.json"
+AGENT = "agent"  # The folder of the agent's own files.
 JSON_PROCESS = "dextron_bench.leaderboard.submission.json_process"
 MEMBER = re.compile(
     r"bundle\.json|agent/[A-Za-z0-9][\w.+-]*\.(?:py|pt|onnx|safetensors)"
@@ -60,7 +61,7 @@ def pack(folder: Path, entry: Mapping[str, Any], agent: Mapping[str, Path], file
     run_files = [path for seed in entry["seeds"] for path in sorted(RunFolder.of_seed(folder, seed).path.rglob("*"))]
     members = {name: path for path in run_files if MEMBER.fullmatch(name := str(path.relative_to(folder)))}
     check_agent(agent)
-    members |= {f"agent/{name}": path for name, path in agent.items()}
+    members |= {f"{AGENT}/{name}": path for name, path in agent.items()}
     manifest = {"format": FORMAT, **entry, "files": {name: hashing.sha256(path) for name, path in members.items()}}
     check(manifest, "bundle", file)
 
@@ -141,7 +142,7 @@ def _texts(value: Any) -> Iterator[str]:
 def check_agent(files: Mapping[str, Path]) -> None:
     """Raises BadBundle if a bundle cannot hold an agent's own files, given by name."""
     for name, file in files.items():
-        _check_name(file, f"agent/{name}")
+        _check_name(file, f"{AGENT}/{name}")
         if file.stat().st_size > LARGEST:
             raise BadBundle(f"{file} is larger than the {LARGEST / 2**20:.0f} MiB that a bundle accepts")
 

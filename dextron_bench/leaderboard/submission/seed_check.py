@@ -39,7 +39,7 @@ class SeedCheck:
     """The checks of one seed of an unpacked bundle; `rerun` needs a `check` before it."""
 
     def __init__(self, folder: Path, manifest: Mapping[str, Any], seed: int, splits: Sequence[Split]) -> None:
-        self._run, self._agent_files = RunFolder.of_seed(folder, seed), folder / "agent"
+        self._run, self._agent_files = RunFolder.of_seed(folder, seed), folder / bundle.AGENT
         self._manifest, self._seed, self._splits = manifest, seed, splits
         self._traces: dict[tuple[str, int], str] = {}  # The hash of each replayed episode.
 

@@ -37,7 +37,7 @@ def evil(tmp_path: Path) -> str:
     points = pd.DataFrame({"epoch": [10, 20], "return": [1.0, 2.0]})
     curves = {"minjerk": {method: {0: points} for method in EVIL}}
     file = tmp_path / leaderboard_page.FILE
-    file.write_text(leaderboard_page.document(rows, map(result, EVIL), curves, tmp_path), encoding="utf-8")
+    file.write_text(leaderboard_page.document(rows, map(result, EVIL), curves, tmp_path, {}), encoding="utf-8")
     return file.as_uri()
 
 
@@ -254,5 +254,5 @@ def test_links_to_recordings_lead_to_shipped_files(browser: Any):
 
 def test_equal_results_make_equal_pages(tmp_path: Path):
     rows = standings.table(map(result, EVIL))
-    pages = {leaderboard_page.document(rows, map(result, EVIL), {}, tmp_path) for _ in range(2)}
+    pages = {leaderboard_page.document(rows, map(result, EVIL), {}, tmp_path, {}) for _ in range(2)}
     assert len(pages) == 1

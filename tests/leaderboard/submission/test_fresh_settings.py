@@ -52,7 +52,7 @@ def merged(submitted: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     forged = forged_bundles.taken_apart(submitted / "near.zip", tmp_path_factory.mktemp("merged"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fresh, "draw", draw)
-        add.merge(forged.checked(rerun=True, fresh=FRESH), forged.board)
+        add.merge(forged.checked(rerun=True, fresh=FRESH), forged.board, forged.folder / "agent")
     return forged.board
 
 
