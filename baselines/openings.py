@@ -19,6 +19,7 @@ from dextron_bench.world import model, task
 
 FORMAT = 1  # Version of the cached file.
 OFFSET_SHIFT = 0.01  # [m] largest shift of the offset of a nearby setting, in x and in y.
+DRAWN_TOGETHER = 5  # Nearby settings in a batch.
 NOISE_SHIFT = 0.05, 0.25  # Added to its duration noise. The rows of `hard` keep the noise, so none is near-equal.
 
 
@@ -48,12 +49,26 @@ def rule_succeeds(episode: Episode, edge: float) -> bool:
     return bool(within.size) and within[0] == SUCCEEDS
 
 
-def nearby(setting: Setting, copies: int) -> list[Setting]:
-    """Settings near a setting: with other offsets, and reaches that take a little longer."""
-    rng = np.random.default_rng(int(hashing.digest(repr(setting).encode())[:16], 16))
-    moves = rng.uniform(-OFFSET_SHIFT, OFFSET_SHIFT, (copies, 2))
+def load_nearby(track: Track, settings: Sequence[Setting], copies: int) -> list[list[Episode]]:
+    """The openings of `copies` settings near each setting; raises DamagedFile.
+
+    They are drawn and kept in batches, so that trainings with more copies share the files of those with fewer.
+    """
+    batches = range(-(-copies // DRAWN_TOGETHER))
+    played = [load(track, [near for one in settings for near in nearby(one, batch)]) for batch in batches]
+    return [
+        [one for batch in played for one in batch[first : first + DRAWN_TOGETHER]][:copies]
+        for first in range(0, len(settings) * DRAWN_TOGETHER, DRAWN_TOGETHER)
+    ]
+
+
+def nearby(setting: Setting, batch: int) -> list[Setting]:
+    """DRAWN_TOGETHER settings near a setting: with other offsets, and reaches that take a little longer."""
+    text = repr(setting) + (f" {batch}" if batch else "")
+    rng = np.random.default_rng(int(hashing.digest(text.encode())[:16], 16))
+    moves = rng.uniform(-OFFSET_SHIFT, OFFSET_SHIFT, (DRAWN_TOGETHER, 2))
     offsets = np.clip(np.add(moves, [setting.offset_x, setting.offset_y]), -OFFSET, OFFSET)
-    noise = setting.duration_noise + rng.uniform(*NOISE_SHIFT, (copies, 1))
+    noise = setting.duration_noise + rng.uniform(*NOISE_SHIFT, (DRAWN_TOGETHER, 1))
     return [Setting(setting.reach, *values) for values in np.concatenate([offsets, noise], axis=1).tolist()]
 
 

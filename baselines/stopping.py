@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import ClassVar, Self
 
 import numpy as np
@@ -75,17 +76,21 @@ class Stopping:
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """A trainer with several networks per seed, all trained together."""
-        settings = openings.settings_of(track)[: self.settings or None]
-        played = openings.load(track, openings.settings_of(track))[: len(settings)]
-        episodes = [*played, *self._nearby(track, settings, played), *self._generated(track, settings)]
+        settings = openings.settings_of(track)
+        played = openings.load(track, settings)  # All of them, so that all numbers of settings share the files.
+        near = self._nearby(track, settings, played)
+        count = self.settings or len(settings)
+        episodes = [*played[:count], *chain.from_iterable(near[:count]), *self._generated(track, settings[:count])]
         return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(episodes, track.device), seeds, track.device)
 
-    def _nearby(self, track: Track, settings: Sequence[Setting], played: Sequence[Episode]) -> list[Episode]:
-        """The openings near settings (with their openings `played`) that the rule fails, if closing can succeed."""
-        pairs = zip(settings, played, strict=True)
-        failed = [setting for setting, episode in pairs if not openings.rule_succeeds(episode, EDGE)]
-        near = openings.load(track, [one for setting in failed for one in openings.nearby(setting, self.nearby)])
-        return [episode for episode in near if (episode[1] == SUCCEEDS).any()]
+    def _nearby(self, track: Track, settings: Sequence[Setting], played: Sequence[Episode]) -> list[list[Episode]]:
+        """For each setting (with its opening `played`) that the rule fails, openings near it that closing can solve."""
+        failed = [row for row, episode in enumerate(played) if not openings.rule_succeeds(episode, EDGE)]
+        near = openings.load_nearby(track, [settings[row] for row in failed], self.nearby)
+        solvable: list[list[Episode]] = [[] for _ in settings]
+        for row, episodes in zip(failed, near, strict=True):
+            solvable[row] = [episode for episode in episodes if (episode[1] == SUCCEEDS).any()]
+        return solvable
 
     def _generated(self, track: Track, settings: Sequence[Setting]) -> list[Episode]:
         """The openings on reaches that are generated from the reaches of settings, if closing can succeed."""

@@ -123,6 +123,8 @@ STEPS: tuple[Step, ...] = (
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
     _run("sor", "sor", "real", SEEDS, (SIM,)),
+    *(_run(label, flags, "synthetic") for label, flags in LEARNERS.items()),
+    _run("sor", "sor", "synthetic", needs=(SIM,)),
     _success("real", 4_000_000, 30, ("bc", "rl-hold40", "rlil-0.1")),
     _success("synthetic", 400_000, 15, ("bc-quick", "rlil-0.1-quick")),
     *(_run("omega", "omega", r, needs=(f"{DATA}/success-{r}.safetensors",)) for r in ("real", "synthetic")),

@@ -13,7 +13,7 @@ from torch.testing import assert_close
 from baselines import generated_reaches, openings, pose_features, stopping_trainer
 from baselines.stopping import BadNumber, Stopping, StoppingAgent
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Openings
+from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Episode, Openings
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import Arrays, Track
 from dextron_bench.reaches.setting import OFFSET, Setting
@@ -55,14 +55,36 @@ def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
 
 def test_nearby_settings_are_near_equal_to_no_row_that_is_drawn_with_an_equal_duration():
     setting = Setting("a", OFFSET, -0.01, 0.3)
-    near = openings.nearby(setting, 50)
-    assert near == openings.nearby(setting, 50)
-    assert near[:2] != openings.nearby(Setting("a", OFFSET, -0.01, 0.31), 50)[:2]
+    near = [one for batch in range(10) for one in openings.nearby(setting, batch)]
+    assert near[:10] == openings.nearby(setting, 0) + openings.nearby(setting, 1)
+    assert len(set(near)) == 50
+    assert openings.nearby(Setting("a", OFFSET, -0.01, 0.31), 0)[0] not in near
     moved = np.array([[one.offset_x, one.offset_y + 0.01, one.duration_noise - 0.3] for one in near])
     assert {one.reach for one in near} == {"a"}
     assert OFFSET - 0.01 <= moved[:, 0].min() < moved[:, 0].max() == OFFSET  # Clipped to the largest offset.
     assert -0.01 <= moved[:, 1].min() < -0.005 < 0.005 < moved[:, 1].max() <= 0.01
     assert NEAR_NOISE < moved[:, 2].min() < moved[:, 2].max() <= 0.25
+
+
+def test_more_nearby_settings_begin_with_the_fewer_ones_and_share_their_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Each setting's own three and six copies, told apart by what a fake play returns."""
+    played: list[Setting] = []
+
+    def play(source: object, settings: Sequence[Setting], threads: int) -> list[Episode]:
+        played.extend(settings)
+        return [(np.full((1, model.STATE), setting.offset_x), np.zeros(1, np.int8)) for setting in settings]
+
+    monkeypatch.setattr(openings, "play", play)
+    track = Track(SOURCE, CASES, tmp_path, threads=1)
+    three, six = (openings.load_nearby(track, SETTINGS, copies) for copies in (3, 6))
+    assert len(played) == 2 * 5 * len(SETTINGS)  # Two batches of five, each played once.
+    offsets = [[float(states[0, 0]) for states, _ in episodes] for episodes in six]
+    near = [[*openings.nearby(one, 0), openings.nearby(one, 1)[0]] for one in SETTINGS]
+    np.testing.assert_allclose(offsets, [[one.offset_x for one in group] for group in near], rtol=1e-6)
+    assert [[float(states[0, 0]) for states, _ in episodes] for episodes in three] == [row[:3] for row in offsets]
+    assert openings.load_nearby(track, SETTINGS, 0) == [[] for _ in SETTINGS]
 
 
 def test_the_rule_closes_at_the_first_decision_within_its_distance():

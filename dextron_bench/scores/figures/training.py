@@ -84,7 +84,7 @@ def success_curve(points: list[dict[str, float]], file: Path) -> None:
     table = pd.DataFrame(points).set_index("epoch")
     for axes, name in zip(figure.subplots(1, 2), ("loss", "accuracy"), strict=True):
         axes.plot(table.index, table[name], label="episodes learned from")
-        axes.plot(table.index, table[f"test_{name}"], label="episodes held out")
+        axes.plot(table.index, table[f"test_{name}"], label="held out")
         axes.set(xlabel="epoch", ylabel="cross entropy" if name == "loss" else name)
         axes.legend(fontsize=8)
     save(figure, file, 150)
