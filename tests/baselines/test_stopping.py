@@ -69,7 +69,7 @@ def test_nearby_settings_are_near_equal_to_no_row_that_is_drawn_with_an_equal_du
 def test_more_nearby_settings_begin_with_the_fewer_ones_and_share_their_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Each setting's own three and six copies, told apart by what a fake play returns."""
+    """Each setting's own three and six copies, distinguished by what a fake play returns."""
     played: list[Setting] = []
 
     def play(source: object, settings: Sequence[Setting], threads: int) -> list[Episode]:
