@@ -26,20 +26,28 @@ class BadOutcomes(ValueError):
 def read(file: Path) -> pd.DataFrame:
     """The outcomes in a CSV file, with the columns `reach`, `stratum` and NUMBERS; raises BadOutcomes, OSError."""
     try:
-        table = pd.read_csv(file, dtype={"reach": str, "stratum": str}, float_precision="round_trip")
+        table = pd.read_csv(file, dtype=str)
     except ValueError as error:  # Also a file that is empty or not UTF-8.
         raise BadOutcomes(f"{file}: is not a CSV file ({error})") from error
     missing = [name for name in ("reach", "stratum", *NUMBERS) if name not in table]
     if missing:
         raise BadOutcomes(f"{file}: has no column {missing[0]!r}; outcomes need reach, stratum, {', '.join(NUMBERS)}")
     for name in NUMBERS:
-        table[name] = pd.to_numeric(table[name], errors="coerce")
+        table[name] = table[name].map(_number).astype(float)
     usable = np.isfinite(table[list(NUMBERS)].to_numpy(float)).all(axis=1)
     usable &= table[["reach", "stratum"]].notna().to_numpy().all(axis=1)
     if table.empty or not usable.all():
         where = "has no rows" if table.empty else f"line {np.argmin(usable) + 2}: a value is missing or not a number"
         raise BadOutcomes(f"{file}: {where}")
     return table
+
+
+def _number(text: object) -> float:
+    """The number in a cell, which is NaN if it has none."""
+    try:
+        return float(str(text))
+    except ValueError:
+        return float("nan")
 
 
 def play(outcomes: pd.DataFrame, source: setting.Source, progress: Progress = no_progress) -> np.ndarray:

@@ -28,7 +28,8 @@ def table() -> pd.DataFrame:
     and half widths of two pairs of circles about the local z, `radius_mm` at z +- `half_width_mm` and
     `bevel_radius_mm` at z +- `bevel_half_width_mm`."""
     with files("dextron_bench.data").joinpath("hand-hulls.csv").open(encoding="utf-8") as file:
-        return pd.read_csv(file, float_precision="round_trip")
+        text = pd.read_csv(file, dtype=str)
+    return text.astype({"disc": int, **dict.fromkeys(text.columns[2:], float)})
 
 
 def disc_points(disc: pd.Series) -> np.ndarray:
