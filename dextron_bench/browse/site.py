@@ -20,6 +20,7 @@ from dextron_bench.leaderboard.local_server import (
     Response,
     ViewerFiles,
     file_response,
+    redirect,
     viewer_file,
     viewer_link,
 )
@@ -75,7 +76,7 @@ class BrowseSite:
         except Exception as error:  # The page shows it, and goes on.
             return self._page(search, " ".join(str(error).split()) or type(error).__name__)
         here = f"{search.address}#e{key}"
-        return _redirect(viewer_link(request.host, f"/recordings/{key}.rrd") if self._show is None else here)
+        return redirect(viewer_link(request.host, f"/recordings/{key}.rrd") if self._show is None else here)
 
     def close(self) -> None:
         """Ends what runs beside the server."""
@@ -109,7 +110,3 @@ class BrowseSite:
         for summary in recording.summarise(files, whole=True, hashes=selection.hashes(files)):
             if summary.damage:
                 raise DamagedRecording(f"{summary.file}: {summary.damage}")
-
-
-def _redirect(address: str) -> Response:
-    return Response("text/plain", b"", {"Location": address}, HTTPStatus.SEE_OTHER)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.output import print_json, print_warning
+from dextron_bench.cli.output import print_json
+from dextron_bench.cli.serving import serve
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,11 +78,7 @@ class Browse:
 
         site = BrowseSite(episodes, viewer=web_viewer_files()) if self.web else BrowseSite(episodes, _show)
         with closing(site), LocalServer(site, self.port) as server:
-            print(f"{server.address.rstrip('/')}{search.address}", flush=True)
-            if "SSH_CONNECTION" in os.environ:
-                port = server.server_port
-                print_warning(f"on your own machine: ssh -N -L {port}:127.0.0.1:{port} HOST, then open this address")
-            server.serve_forever()
+            serve(server, search.address)
 
 
 def _show(file: Path) -> None:

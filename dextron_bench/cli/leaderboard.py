@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table
+from dextron_bench.cli.serving import serve
 from dextron_bench.splits.tracks import PLUS
 
 if TYPE_CHECKING:
@@ -93,8 +94,7 @@ class Serve:
                 server.site.viewer.update(web_viewer_files())
             except ViewerError as error:
                 print(f"dextron-bench: links download recordings, without a viewer: {error}", file=sys.stderr)
-            print(server.address, flush=True)
-            server.serve_forever()
+            serve(server)
         return DONE
 
 

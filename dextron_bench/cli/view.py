@@ -12,6 +12,7 @@ import tyro
 from dextron_bench.cli.episode_flags import EpisodeFlags
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_table, print_warning, progress_bar
+from dextron_bench.cli.serving import serve
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class View(EpisodeFlags):
-    """Open recordings together in one window of the Rerun viewer; no network is needed.
+    """Open recordings together in one window of Rerun's viewer, or in the browser; no network is needed.
 
     By default the command opens all recordings at the given places. The options --worst to --row select episodes of
     the runs at these places instead; without --worst or --best, the first five. Episodes without a recording are
@@ -31,6 +32,9 @@ class View(EpisodeFlags):
     only one of them solves. With --live and a place, the window follows the trainings there, running or finished:
     curves, and the newest episodes of each seed. With --live and --method, a policy plays --row of --split.
 
+    --web serves the recordings on this machine only, until Ctrl-C. On another machine, forward the port:
+    ssh -L 8767:127.0.0.1:8767 HOST.
+
     Example: dextron-bench view runs/exp/synthetic/seed0
 
     Example: dextron-bench view --live runs/rlil-0.1/synthetic
@@ -39,7 +43,7 @@ class View(EpisodeFlags):
 
     Example: dextron-bench view --diff runs/bc-quick/real/seed0 runs/rlil-0.1-quick/real/seed0
 
-    Example: dextron-bench view my-agent-synthetic.zip --failed
+    Example: dextron-bench view my-agent-synthetic.zip --failed --web
 
     Example: dextron-bench view --worst 5 --method rlil-0.1 --reaches real --split unseen-subject --seed 0
     """
@@ -54,6 +58,10 @@ class View(EpisodeFlags):
     """Speed of --live, as a multiple of real time; 0 means without delay."""
     runs: Path = Path("runs")
     """Folder of all runs."""
+    web: bool = False
+    """Open the recordings in the browser; no screen and no GPU is needed here."""
+    port: int = 8767
+    """With --web: the port on 127.0.0.1; 0 takes a free one."""
     print: bool = False
     """Print the names of the files, one in each line, instead of opening them; works without a display."""
     quiet: bool = False
@@ -63,12 +71,14 @@ class View(EpisodeFlags):
         from dextron_bench import recording
 
         if self.live:
-            return self._follow_training() if self.place else self._play_live()
+            return self._live()
         places, episode_filter = self._places(), self.episode_filter()
         files = [self._side_by_side(places, episode_filter)] if self.diff else self._recordings(places, episode_filter)
         undamaged = _undamaged(files)
         if self.print:
             print(*undamaged, sep="\n")
+        elif self.web:
+            self._serve(undamaged)
         else:
             recording.view(undamaged)
         return DONE if len(undamaged) == len(files) else DIFFERS
@@ -94,6 +104,21 @@ class View(EpisodeFlags):
             raise selection.BadFilter(f"--diff takes two places, recordings or runs; there are {len(self.place)}")
         first, second = places
         return side_by_side.side_by_side(first, second, episode_filter, self.runs)
+
+    def _serve(self, files: Sequence[Path]) -> None:
+        from dextron_bench.browse.viewer_site import ViewerSite
+        from dextron_bench.leaderboard.local_server import LocalServer
+        from dextron_bench.recording import web_viewer_files
+
+        with LocalServer(ViewerSite(files, web_viewer_files()), self.port) as server:
+            serve(server)
+
+    def _live(self) -> int:
+        from dextron_bench.runs.selection import BadFilter
+
+        if self.web:
+            raise BadFilter("--live shows its window on a screen; `run --tracker tensorboard` follows in the browser")
+        return self._follow_training() if self.place else self._play_live()
 
     def _follow_training(self) -> int:
         """Shows the trainings at the places until the user closes the window."""

@@ -156,9 +156,15 @@ def viewer_file(viewer: ViewerFiles, path: str) -> Response | None:
     return Response(*viewer[name], {"Content-Security-Policy": VIEWER_POLICY})
 
 
-def viewer_link(host: str, path: str) -> str:
-    """The address of a recording of this server, whose path is quoted, in the web viewer."""
-    return f"{VIEWER}?url={quote(f'http://{host}{path}', safe='')}"
+def viewer_link(host: str, *paths: str) -> str:
+    """The address of recordings of this server, whose paths are quoted, in the web viewer."""
+    recordings = "&".join("url=" + quote(f"http://{host}{path}", safe="") for path in paths)
+    return f"{VIEWER}?{recordings}"
+
+
+def redirect(address: str) -> Response:
+    """Sends the browser to another address of this server."""
+    return Response("text/plain", b"", {"Location": address}, HTTPStatus.SEE_OTHER)
 
 
 def file_response(file: Path, mime_type: str) -> Response | None:

@@ -34,7 +34,9 @@ class NoScreen(ViewerError):
 def require_screen() -> None:
     """Raises NoScreen on Linux without a display."""
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise NoScreen("there is no screen for the native viewer; `browse --web` opens recordings in the browser")
+        raise NoScreen(
+            "there is no screen for the native viewer; `view --web` and `browse --web` open recordings in the browser"
+        )
 
 
 def view(files: Sequence[Path]) -> None:

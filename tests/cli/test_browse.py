@@ -57,7 +57,7 @@ def test_the_native_viewer_needs_a_screen(here: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    assert "`browse --web` opens recordings in the browser" in complaint("browse")
+    assert "`view --web` and `browse --web` open recordings in the browser" in complaint("browse")
 
 
 def test_a_viewer_that_ends_at_once_is_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):

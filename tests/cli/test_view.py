@@ -12,6 +12,7 @@ import rerun as rr
 
 from dextron_bench import recording
 from dextron_bench.cli import main
+from dextron_bench.leaderboard.local_server import LocalServer, Request
 from dextron_bench.storage import tables
 from dextron_bench.success import network
 from tests.helpers import fixed_success_model
@@ -70,6 +71,39 @@ def test_print_lists_the_files(here: Path, opened: list[str], capsys: pytest.Cap
     assert printed.out.splitlines() == [f"{NOTHING}/recordings/test-000{row}.rrd" for row in (0, 1)]
     assert main.main(["view", "--runs", "runs", "--row", "1", "--print"]) == 0
     assert [line.split("/")[1] for line in capsys.readouterr().out.splitlines()] == ["exp", "nothing"]
+
+
+def test_the_browser_opens_all_files_together(
+    here: Path,
+    opened: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    complaint: Callable[..., str],
+):
+    answers: dict[str, tuple[int, str, bytes]] = {}
+
+    def serve(server: LocalServer) -> None:
+        for path in ("/", "/recordings/0.rrd", "/recordings/1.rrd", "/recordings/2.rrd", "/viewer/", "/other"):
+            response = server.site.respond(Request(path, {}, "127.0.0.1:1"))
+            answers[path] = (
+                (404, "", b"")
+                if response is None
+                else (response.status, response.headers.get("Location", ""), response.body)
+            )
+
+    monkeypatch.setattr(LocalServer, "serve_forever", serve)
+    monkeypatch.setattr(recording, "web_viewer_files", lambda: {"index.html": ("text/html", b"viewer")})
+    capsys.readouterr()
+    assert main.main(["view", "runs/exp", NOTHING, "--row", "0", "--web", "--port", "0", "--quiet"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("http://127.0.0.1:")
+    first, second = (f"http%3A%2F%2F127.0.0.1%3A1%2Frecordings%2F{n}.rrd" for n in (0, 1))
+    assert answers["/"] == (303, f"/viewer/?url={first}&url={second}", b"")
+    files = [Path(folder) / "recordings/test-0000.rrd" for folder in ("runs/exp/synthetic/seed0", NOTHING)]
+    assert [answers[f"/recordings/{n}.rrd"][2] for n in (0, 1)] == [file.read_bytes() for file in files]
+    assert answers["/viewer/"] == (200, "", b"viewer")
+    assert (answers["/recordings/2.rrd"][0], answers["/other"][0]) == (404, 404)
+    assert opened == []
+    assert "--live shows its window on a screen" in complaint("view", "runs/exp", "--live", "--web")
 
 
 def test_damaged_recordings_are_listed_and_the_others_are_opened(
