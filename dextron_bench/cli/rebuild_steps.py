@@ -84,8 +84,8 @@ LEARNERS = {  # By label: the flags of the method.
     "rl-hold40": "rl --hold 40",
     "rlil-0.1": "rlil --dur 0.1",
     "rlil-0.3": "rlil --dur 0.3",
-    "rlil-0.3-2q": "rlil --dur 0.3 --critics 2",
 }
+SHOWN = ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")  # learners with recordings that ship
 RULES = ("reflex", "nothing", "random")
 SIM = f"{WEIGHTS}/sim-0.1/minjerk/*"
 SIM_QUICK = f"{WEIGHTS}/sim-0.1-quick/minjerk/*"
@@ -122,25 +122,25 @@ STEPS: tuple[Step, ...] = (
     _run("stopping-generated2000", "stopping --generated 2000", "real", SEEDS),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
+    _run("rlil-0.1-2q", "rlil --dur 0.1 --critics 2", "real"),  # the seed in which RLIL 0.1 diverges
     _run("sor", "sor", "real", SEEDS, (SIM,)),
     *(_run(label, flags, "synthetic") for label, flags in LEARNERS.items()),
     _run("sor", "sor", "synthetic", needs=(SIM,)),
     _success("real", 4_000_000, 30, ("bc", "rl-hold40", "rlil-0.1")),
-    _success("synthetic", 400_000, 15, ("bc-quick", "rlil-0.1-quick")),
+    _success("synthetic", 1_000_000, 30, ("bc", "rl-hold40", "rlil-0.1")),
     *(_run("omega", "omega", r, needs=(f"{DATA}/success-{r}.safetensors",)) for r in ("real", "synthetic")),
     Step(
         "recordings",
         (
             "run --method exp --split test --no-floors --runs {runs}/show",
-            *(_show(f"{LEARNERS[label]} --preset quick") for label in ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")),
-            _show("sor --preset quick"),
-            _show("stopping"),
-            _show("sim --preset quick", "minjerk"),
+            *(_show(LEARNERS[label]) for label in SHOWN),
+            *map(_show, ("sor", "stopping")),
+            _show("sim", "minjerk"),
             "recordings choose --runs {runs}/show --into recordings",
         ),
         needs=(
-            *(SPLITS, f"{WEIGHTS}/*-quick/*/seed0.safetensors", f"{WEIGHTS}/stopping/synthetic/seed0.safetensors"),
-            f"{DATA}/success-synthetic.safetensors",
+            *(SPLITS, f"{DATA}/success-synthetic.safetensors", SIM),
+            *(f"{WEIGHTS}/{label}/synthetic/seed0.safetensors" for label in (*SHOWN, "stopping")),
         ),
         makes=("recordings/*.rrd",),
     ),
