@@ -24,7 +24,7 @@ class Check:
     Example: dextron-bench check my_agent/agent.py:MyAgent
     """
 
-    agent: tyro.conf.Positional[str]
+    agent: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="AGENT")]
     """The agent; see above for its forms."""
     reaches: RankedSource = "synthetic"
     """The source of reaches."""

@@ -30,7 +30,7 @@ class Verify:
     Example: dextron-bench leaderboard verify my-agent-synthetic.zip
     """
 
-    bundle: tyro.conf.Positional[Path | None] = None
+    bundle: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.zip")] = None
     """The submission."""
     all: bool = False
     """Verify the leaderboard's own rows instead of a submission."""
@@ -100,7 +100,7 @@ class Add:
     Example: dextron-bench leaderboard add my-agent-synthetic.zip
     """
 
-    bundle: tyro.conf.Positional[Path]
+    bundle: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.zip")]
     """The submission."""
     rerun: bool = False
     """Also run its agent again, in a sandbox; the tier of its row is then `re-run` instead of `replayed`."""

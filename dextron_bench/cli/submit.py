@@ -32,7 +32,7 @@ class Submit:
     Example: dextron-bench submit my_agent/agent.py:MyAgent --name my-agent
     """
 
-    agent: tyro.conf.Positional[str]
+    agent: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="AGENT")]
     """The agent; see above for its forms."""
     name: str
     """The name of its row on the leaderboard."""

@@ -15,7 +15,9 @@ def test_without_a_screen_the_native_viewer_is_refused(tmp_path: Path, monkeypat
     monkeypatch.setattr("sys.platform", "linux")
     file = tmp_path / "one.rrd"
     file.touch()
-    with pytest.raises(recording.ViewerError, match="there is no screen for the native viewer; `view --web` and `browse --web`"):
+    with pytest.raises(
+        recording.ViewerError, match="there is no screen for the native viewer; `view --web` and `browse --web`"
+    ):
         recording.view([file])
 
 
