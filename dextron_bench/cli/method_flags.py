@@ -19,7 +19,7 @@ ALL, METHOD = "--all", "--method"
 class Length:
     """The setting that all methods with training share."""
 
-    preset: Literal["paper", "quick", "smoke"] = "paper"
+    preset: Literal["paper", "quick", "tenth", "smoke"] = "paper"
     """How long methods train."""
 
 

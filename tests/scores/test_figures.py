@@ -65,8 +65,8 @@ def test_windows_are_drawn_also_for_settings_that_never_work_and_for_hands_that_
 
 
 def test_a_part_of_a_training_is_not_drawn_beside_the_whole():
-    labels = ["rl-quick", "rl", "rlil-0.1-quick", "exp"]
-    assert training.without_parts(labels) == ["exp", "rl", "rlil-0.1-quick"]
+    labels = ["rl-quick", "rl-tenth", "rl", "rlil-0.1-quick", "rlpd-tenth", "exp"]
+    assert training.without_parts(labels) == ["exp", "rl", "rlil-0.1-quick", "rlpd-tenth"]
 
 
 def test_learning_curves_show_the_median_over_seeds_and_each_seed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from dextron_bench.scores.cells import counted
 from dextron_bench.scores.figures.pictures import check_format, save
 
-PART = "-quick"  # Ends the label of a training with the first fifth of the paper's budget.
+PARTS = ("-quick", "-tenth")  # End the label of a training with the first fifth or tenth of the paper's budget.
 PANELS = 4  # Beside each other: one for each method with several seeds.
 OVERVIEW, PANEL = 5.0, 1.6  # Heights of the axes with all methods, and of a row of panels [inches].
 LIMITS = (0.0, 20.5)
@@ -70,8 +70,9 @@ def _by_seed(points: Mapping[int, pd.DataFrame]) -> pd.DataFrame:
 
 
 def without_parts(labels: Collection[str]) -> list[str]:
-    """Sorted labels, without `x-quick` where `x` is there: its training begins with the same epochs."""
-    return sorted(label for label in labels if not label.endswith(PART) or label.removesuffix(PART) not in labels)
+    """Sorted labels, without `x-quick` and `x-tenth` where `x` is there: its training begins with the same epochs."""
+    parts = {label + part for label in labels for part in PARTS}
+    return sorted(label for label in labels if label not in parts)
 
 
 def success_curve(points: list[dict[str, float]], file: Path) -> None:
