@@ -11,7 +11,7 @@ import numpy as np
 
 from baselines.random_streams import DEMONSTRATIONS, generator
 from baselines.replay import CAPACITY, Transitions
-from dextron_bench import Case, ExpertAgent, Track, rollout
+from dextron_bench import Case, Episode, ExpertAgent, Track, rollout
 from dextron_bench.storage import atomic, hashing, tensors
 from dextron_bench.world import model
 
@@ -118,7 +118,10 @@ def _stored(file: Path, episodes: int) -> Demonstrations:
 
 def play(track: Track, cases: Sequence[Case]) -> dict[str, np.ndarray]:
     """The arrays of `Demonstrations`, from rollouts of each case's expert."""
-    played = dict(rollout(ExpertAgent(), track.source, cases, threads=track.threads))
+    played: dict[int, Episode] = {}
+    for number, episode in rollout(ExpertAgent(), track.source, cases, threads=track.threads):
+        played[number] = episode
+        track.report(len(played), len(cases), "expert episodes played")
     episodes = [played[k] for k in range(len(cases))]
     lengths = [len(episode.states) for episode in episodes]
     return {

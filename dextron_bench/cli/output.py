@@ -127,7 +127,7 @@ class _Lines:
             return
         _Lines.printed = now
         speed = (done - self._first) / (now - self._start) if now > self._start else 0.0
-        left = f", {_duration((total - done) / speed)} left" if total and speed else ""
+        left = f", {_duration(max(total - done, 0) / speed)} left" if total and speed else ""
         rate = f"{_rate(speed)}{left}" if speed else ""
         parts = f"{self._title}: {done}{f'/{total}' if total else ''}", rate, printable(note)
         print(", ".join(filter(None, parts)), file=sys.stderr, flush=True)

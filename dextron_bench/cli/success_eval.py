@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.output import print_json, print_table
+from dextron_bench.cli.output import print_json, print_markdown, print_table
 from dextron_bench.cli.success import folder_of
 from dextron_bench.reaches.sources import RankedSource
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from dextron_bench.experts.policies import Case
     from dextron_bench.success.exemplars import PredictedEpisode
     from dextron_bench.success.network import SuccessModel
+
+
+EXPERTS = "experts"  # What the rows of experts are called; other rows are called after a file of weights.
 
 
 class NoRows(ValueError):
@@ -51,6 +54,8 @@ class Eval:
     """Threads of the simulation; 0 means one per processor."""
     json: bool = False
     """Print the rows as JSON, with the AUC by time and the calibration."""
+    markdown: bool = False
+    """Print the same as Markdown, for a document."""
 
     def __call__(self) -> int:
         from dextron_bench.methods import weights
@@ -59,7 +64,7 @@ class Eval:
         from dextron_bench.success import evaluation
 
         model, source = load_model(self.model, self.runs, self.reaches), open_source(self.reaches)
-        players = {"experts": None} | {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
+        players = {EXPERTS: None} | {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
         rows = []
         for name in self.split or ranking_splits(self.reaches):
             cases = _first(load_split(self.reaches, name).cases, self.rows)
@@ -69,6 +74,8 @@ class Eval:
                 rows.append({"split": name, "player": player, **result.as_dict()})
         if self.json:
             print_json(rows)
+        elif self.markdown:
+            _print_markdown(rows)
         else:
             columns = [column for column, value in rows[0].items() if not isinstance(value, list)]
             print_table("success model", columns, [[row[column] for column in columns] for row in rows])
@@ -117,6 +124,40 @@ class Explain:
             print(f"dextron-bench: no episode of this kind: {'; '.join(missing)}", file=sys.stderr)
         print(self.into)
         return DONE
+
+
+def _print_markdown(rows: Sequence[Mapping[str, Any]]) -> None:
+    """Prints three tables: the scores, the AUC by time, and the calibration on the first split."""
+    import numpy as np
+
+    from dextron_bench.storage import tensors
+
+    def agent(row: Mapping[str, Any]) -> str:
+        return row["player"] if row["player"] == EXPERTS else tensors.read_about(Path(row["player"]))["label"]
+
+    def number(value: float | None, digits: int) -> str:
+        return "" if value is None or np.isnan(value) else f"{value:.{digits}f}"
+
+    columns = ["success [%]", "accuracy [%]", "base-rate accuracy [%]", "Brier", "base-rate Brier"]
+    shares = ("base_rate", "accuracy", "base_accuracy")
+    scores = ("brier", "base_brier", "calibration_error", "auc")
+    print_markdown(
+        ["split", "agent", "transitions", *columns, "calibration error", "AUC"],
+        [
+            [f"`{row['split']}`", agent(row), f"{row['rows']:,}"]
+            + [number(100 * row[name], 1) for name in shares]
+            + [number(row[name], 3) for name in scores]
+            for row in rows
+        ],
+    )
+    print()
+    tenths = [f"{10 * k}-{10 * k + 10}" for k in range(10)]
+    by_time = [[f"`{row['split']}`", agent(row), *(number(value, 2) for value in row["auc_by_time"])] for row in rows]
+    print_markdown(["split", "agent", *tenths, "after"], by_time)
+    print()
+    first = [row for row in rows if row["split"] == rows[0]["split"]]
+    bins = [f"{k / 10:.1f}-{(k + 1) / 10:.1f}" for k in range(10)]
+    print_markdown(["agent", *bins], [[agent(row), *(number(value, 2) for value in row["observed"])] for row in first])
 
 
 def _print_exemplars(chosen: Mapping[str, PredictedEpisode], cases: Sequence[Case]) -> None:

@@ -31,8 +31,10 @@ def test_a_stream_has_whole_episodes_and_the_given_length():
 
 
 def test_demonstrations_equal_the_rollouts_of_experts_and_are_cached(tmp_path: Path):
-    track = Track(SOURCE, CASES, tmp_path, threads=1)
+    reported: list[tuple[int, int]] = []
+    track = Track(SOURCE, CASES, tmp_path, 1, report=lambda done, total, note: reported.append((done, total)))
     demos = demonstrations.load(track)
+    assert reported == [(1, 3), (2, 3), (3, 3)]
     played = dict(rollout(ExpertAgent(), SOURCE, CASES, threads=1))
     for k in range(3):
         rows = slice(demos.starts[k], demos.starts[k + 1])

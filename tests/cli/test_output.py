@@ -76,13 +76,13 @@ def test_without_a_terminal_a_line_each_minute_says_what_is_done_and_left(
         for at, done in (*((1030.0, 105), (1059.0, 109), (1120.0, 120)), *((1150.0, 125), (1180.0, 130))):
             now = at
             progress(done, 400, "val 3.1")
-        for at, done in ((1250.0, 0), (1310.0, 60)):  # Other work begins.
+        for at, done in ((1250.0, 0), (1310.0, 60), (1600.0, 420)):  # Other work begins, and does more than it was to.
             now = at
             progress(done, 400)
     assert capsys.readouterr() == (
         "",
         "rows: 120/400, 0.17/s, 28 min left, val 3.1\nrows: 130/400, 0.17/s, 27 min left, val 3.1\n"
-        "rows: 0/400\nrows: 60/400, 1/s, 5 min left\n",
+        "rows: 0/400\nrows: 60/400, 1/s, 5 min left\nrows: 420/400, 1.2/s, 0 s left\n",
     )
 
 

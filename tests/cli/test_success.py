@@ -44,6 +44,12 @@ def test_a_data_set_with_policies_and_a_model_trained_on_it(here: Path, capsys: 
     assert 0.0 < experts["base_rate"] < 1.0  # The experts of the rows succeed, randomly drawn ones do not.
     assert sum(experts["predictions"]) == experts["rows"]
     assert len(experts["auc_by_time"]) == 11
+    assert main.main(["success", "eval", "--split", "test", *words[:2], "--markdown"]) == 0
+    scores, by_time, calibration = capsys.readouterr().out.split("\n\n")
+    shares = [f"{100 * experts[name]:.1f}" for name in ("base_rate", "accuracy", "base_accuracy")]
+    assert scores.splitlines()[2].startswith(f"| `test` | experts | {experts['rows']:,} | {' | '.join(shares)} |")
+    assert [line.split(" | ")[1] for line in by_time.splitlines()[2:]] == ["experts", "bc-smoke"]
+    assert len(calibration.splitlines()) == 4
     assert main.main(["success", "eval", "--split", "test"]) == 0
     assert main.main(["success", "explain", *words[:2], "--into", "pictures/fig5.png"]) == 0
     assert "expert" in capsys.readouterr().out
