@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -14,6 +16,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("dextron_bench", "baselines")
+CONTAINER_FILE = ROOT / "Containerfile"
+BUILDERS = ("docker", "podman")
 
 pytestmark = pytest.mark.slow
 
@@ -74,3 +78,30 @@ def test_the_wheel_runs_without_the_checkout(wheel: Path, tmp_path: Path):
     words = ("run", "--method", "nothing", "--split", "val", "--record", "0", "--quiet")
     assert "nothing" in run(*dextron_bench, *words, folder=elsewhere, environment=environment)
     assert (elsewhere / "runs/nothing/synthetic/seed0/result.json").exists()
+
+
+def test_the_container_file_has_the_tested_version_of_pytorch_and_renders_without_a_gpu():
+    text, tested = CONTAINER_FILE.read_text(), (ROOT / "constraints.txt").read_text().splitlines()
+    assert set(re.findall(r"torch==[\d.]+", text)) & set(tested)
+    assert "-c /src/constraints.txt" in text
+    assert "libosmesa6" in text
+    assert "MUJOCO_GL=osmesa" in text
+    ignored = (ROOT / ".dockerignore").read_text().split()
+    assert {"runs", "dextron-*.zip", "real-reaches*.npz"} <= set(ignored)  # No image may hold the recorded reaches.
+
+
+def test_the_image_of_the_container_file_runs_an_agent():
+    builder = next((name for name in BUILDERS if shutil.which(name) and _works(name)), None)
+    if builder is None:
+        pytest.skip(f"no engine of {' or '.join(BUILDERS)} runs here")
+    build = [builder, "build", "--quiet", "--tag", "dextron-bench-test", "--file", str(CONTAINER_FILE), str(ROOT)]
+    subprocess.run(build, check=True, capture_output=True)
+    words = ("run", "--method", "nothing", "--split", "val", "--record", "1", "--quiet", "--json")
+    done = subprocess.run([builder, "run", "--rm", "dextron-bench-test", *words], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert '"nothing"' in done.stdout
+
+
+def _works(builder: str) -> bool:
+    """True if the engine behind a builder answers; some machines have its client alone."""
+    return subprocess.run([builder, "info"], capture_output=True).returncode == 0
