@@ -16,6 +16,7 @@ from dextron_bench.cli import (
     figures,
     leaderboard,
     leaderboard_fresh,
+    leaderboard_tracks,
     leaderboard_verify,
     mc,
     new_agent,
@@ -54,11 +55,11 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "cross-validate": cross_validate.CrossValidate,
     "leaderboard": (
         "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
-        "add a submission to it; play fresh settings.",
+        "add a submission to it; play fresh settings and tracks.",
         {
             **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
             **{"verify": leaderboard_verify.Verify, "add": leaderboard_verify.Add},
-            "fresh": leaderboard_fresh.Fresh,
+            **{"fresh": leaderboard_fresh.Fresh, "tracks": leaderboard_tracks.Tracks},
         },
     ),
     "new-agent": new_agent.NewAgent,

@@ -70,11 +70,7 @@ def _rerun_split(
     run: RunFolder, result: dict[str, Any], split: Split, rows: np.ndarray, threads: int, finding: Finding
 ) -> int:
     """Runs the agent on rows of a split and adds the differences; returns how many rows it played in the end."""
-    source, cases = sources.open_source(split.reaches), [split.cases[row] for row in rows]
-    bottles = split.bottles_of(rows)
-    agent = agent_of(run, result)
-    episodes = dict(rollout(agent, source, cases, threads=threads, track=split.track, bottles=bottles))
-    table = pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
+    table = play_rows(run, result, split, rows, threads)
     computed, whole = result_files.scores_by_split(table)[split.name], len(rows) == len(split.cases)
     differences = list(_differences(result["splits"][split.name], computed, rows, whole))
     if differences and not whole:  # An agent may draw numbers in an order that depends on the other episodes.
@@ -95,6 +91,14 @@ def _differences(claimed: dict[str, Any], computed: dict[str, Any], rows: np.nda
     for name in ("failed", "causes", "closing_lag") if whole else ():
         if claimed[name] != computed[name]:
             yield f"says {name.replace('_', ' ')} {claimed[name]}; run again it is {computed[name]}"
+
+
+def play_rows(run: RunFolder, result: dict[str, Any], split: Split, rows: np.ndarray, threads: int) -> pd.DataFrame:
+    """The table of the episodes of a row's agent, run again, on some rows of a split."""
+    source, cases, bottles = sources.open_source(split.reaches), [split.cases[k] for k in rows], split.bottles_of(rows)
+    agent = agent_of(run, result)
+    episodes = dict(rollout(agent, source, cases, threads=threads, track=split.track, bottles=bottles))
+    return pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
 
 
 def drawn_rows(total: int, count: int) -> np.ndarray:

@@ -13,11 +13,12 @@ from dextron_bench.methods.agents import as_agent_error
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
+from dextron_bench.splits.tracks import PLUS
 from dextron_bench.storage import atomic, hashing, provenance, schemas
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
 
-STAMPED = ("tier", "fresh")  # What verifications add to a result.
+STAMPED = ("tier", "fresh")  # What verifications add to a result. Splits under tracks can be added, too.
 RESULTS = "results"  # In the leaderboard's folder: a folder of runs without their large files.
 
 
@@ -65,9 +66,10 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
 
 
 def run_digest(file: Path) -> str:
-    """The hash of a published result without what a verification adds to it: its tier, fresh scores and actions."""
+    """The hash of a published result without what is added later: tier, fresh scores, actions, splits under tracks."""
     result = result_files.read_result(file)
-    splits = {name: {key: split[key] for key in split if key != "actions"} for name, split in result["splits"].items()}
+    plain = {name: split for name, split in result["splits"].items() if PLUS not in name}
+    splits = {name: {key: split[key] for key in split if key != "actions"} for name, split in plain.items()}
     kept = {key: result[key] for key in result if key not in STAMPED}
     return hashing.digest(json.dumps({**kept, "splits": splits}, sort_keys=True).encode())
 
@@ -80,20 +82,23 @@ def _is_complete(result: dict[str, Any]) -> bool:
 
 
 def _with_tier(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
-    """A result with what was verified of the one that it replaces, if both have the same scores."""
+    """A result with what was added to the one that it replaces, if both have the same plain scores."""
     if not before or _scores(result) != _scores(before):
         return result
-    hashes = {name: before["splits"][name].get("actions") for name in result["splits"]}
+    known = before["splits"]
+    hashes = {name: known[name].get("actions") for name in result["splits"] if name in known}
     splits = {
-        name: split | ({"actions": hashes[name]} if hashes[name] else {}) for name, split in result["splits"].items()
+        name: split | ({"actions": hashes[name]} if hashes.get(name) else {})
+        for name, split in result["splits"].items()
     }
+    splits |= {name: split for name, split in known.items() if PLUS in name and name not in splits}
     kept = {name: before[name] for name in STAMPED if name in before}
     return {**result, "splits": splits, **kept}
 
 
 def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]:
-    """The scores of every split, and the hash of the weights that reached them."""
-    scores = {name: split["scores"] for name, split in result["splits"].items()}
+    """The scores of every plain split, and the hash of the weights that reached them."""
+    scores = {name: split["scores"] for name, split in result["splits"].items() if PLUS not in name}
     return scores, (result.get("training") or {}).get("sha256")
 
 

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench.evaluation import episode_table
-from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.leaderboard.baseline_check import agent_of, drawn_rows
+from dextron_bench.leaderboard.baseline_check import drawn_rows, play_rows
 from dextron_bench.leaderboard.fresh_settings import FreshSettings, from_frame, to_frame
 from dextron_bench.leaderboard.submission import replay_check
 from dextron_bench.reaches import sources
@@ -65,7 +63,7 @@ def play(
     """Plays fresh settings with the agent of a baseline's row, and writes the scores into its result."""
     parts, total = [], sum(len(split.cases) for split in splits)
     for split in splits:
-        parts.append(_episodes(run, result, split, np.arange(len(split.cases)), threads))
+        parts.append(play_rows(run, result, split, np.arange(len(split.cases)), threads))
         report(sum(map(len, parts)), total)
     atomic.write_json(run.result, {**result, "fresh": fresh.scores(pd.concat(parts))})
 
@@ -113,7 +111,7 @@ def _faults_of_baseline(
         if known["digest"] != split.digest or len(known["scores"]) != len(split.cases):
             return [f"it has no scores for every fresh setting of {split.name}"]
         rows = drawn_rows(len(split.cases), count)
-        if _episodes(run, result, split, rows, threads)["score"].tolist() != [known["scores"][row] for row in rows]:
+        if play_rows(run, result, split, rows, threads)["score"].tolist() != [known["scores"][row] for row in rows]:
             return [f"its scores on fresh settings of {split.name} differ from its episodes, run again"]
     return []
 
@@ -124,13 +122,6 @@ def _redrawn(claimed: dict[str, Any], reaches: str, splits: list[Split], threads
     again = {split.name: split.digest for split in fresh.draw(reaches, threads, report)}
     differing = [split.name for split in splits if again.get(split.name) != split.digest]
     return [f"its fresh settings of {', '.join(differing)} do not follow from its beacon"] if differing else []
-
-
-def _episodes(run: RunFolder, result: dict[str, Any], split: Split, rows: np.ndarray, threads: int) -> pd.DataFrame:
-    """The table of the episodes of a baseline on some rows of a split."""
-    source, cases = sources.open_source(split.reaches), [split.cases[row] for row in rows]
-    episodes = dict(rollout(agent_of(run, result), source, cases, threads=threads))
-    return pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
 
 
 def _read(file: Path, columns: tables.Columns) -> pd.DataFrame:
