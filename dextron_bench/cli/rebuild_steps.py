@@ -86,6 +86,7 @@ LEARNERS = {  # By label: the flags of the method.
     "rlil-0.3": "rlil --dur 0.3",
 }
 SHOWN = ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")  # learners with recordings that ship
+UNDER_TRACKS = ("reflex", "rlil-0.1", "stopping")  # The rule, the paper's best method, and the one that leads.
 RULES = ("reflex", "nothing", "random")
 SIM = f"{WEIGHTS}/sim-0.1/minjerk/*"
 SIM_QUICK = f"{WEIGHTS}/sim-0.1-quick/minjerk/*"
@@ -158,6 +159,11 @@ STEPS: tuple[Step, ...] = (
         ("leaderboard fresh --rows 100",),
         needs=(SPLITS, f"{WEIGHTS}/*/*/*.safetensors"),
         makes=("leaderboard/fresh/*",),
+    ),
+    Step(
+        "tracks",
+        (f"leaderboard tracks --method {' '.join(UNDER_TRACKS)}",),
+        needs=(SPLITS, f"{DATA}/bottles-*", *(f"{WEIGHTS}/{label}/*/*.safetensors" for label in UNDER_TRACKS)),
     ),
     Step(
         "board",

@@ -27,7 +27,7 @@ def splits_to_play(reaches: str, split: str, tracks: Sequence[str] = ()) -> list
 
 
 def missing(result: dict[str, Any], splits: Sequence[Split]) -> list[Split]:
-    """Those of some splits that a row has not played in their present version."""
+    """The splits, among some, that a row has not played in their present version."""
     played = {name: part["digest"] for name, part in result["splits"].items()}
     return [split for split in splits if played.get(split.name) != split.digest]
 
