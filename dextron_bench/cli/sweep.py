@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from dextron_bench.cli import clusters
 from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.method_flags import settings_dict
 from dextron_bench.cli.output import print_json, print_table, progress_bar
@@ -31,6 +32,8 @@ class Sweep:
     Example: dextron-bench sweep --method mine.py:Mine --grid near=0.04,0.06,0.08 --seed 0 1 2
 
     Example: dextron-bench sweep --method stopping --grid settings=100,200,400 --reaches real --into scaling.png
+
+    Example: dextron-bench sweep --method rl --preset quick --grid hold=1,20,40 --seed 0 1 2 --cluster local
     """
 
     method: str = ""
@@ -55,6 +58,9 @@ class Sweep:
     """The name of the sweep; by default the method's name and a hash of what is asked."""
     show: bool = False
     """Run nothing: show this sweep, the one of --name, or a list of all."""
+    cluster: clusters.Flag = ""
+    """Do the trials of a grid or a random search side by side on a cluster with Ray: on this machine, on the cluster it
+    belongs to, or on another one."""
     into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
     """Also draw the scores on `val` against the setting that varies, which has numbers, into this file."""
     runs: Path = Path("runs")
@@ -77,10 +83,13 @@ class Sweep:
             return self._show_all() if not self.name else self._print(SweepFile.of(self.runs, self.name))
         if not self.method:
             raise BadSweep("give --method, or --show to see the sweeps in the folder of runs")
+        clusters.check(self.cluster)
         question = self._question()
         file = SweepFile.of(self.runs, self.name or default_name(question))
         self._check_picture(space.as_json(question.space))
         if not self.show:
+            if self.cluster:
+                self._run_on_cluster(question, file)
             count = question.trials(self.trials)
 
             def ended(number: int, trial: Trial) -> None:
@@ -92,6 +101,24 @@ class Sweep:
             )
             execution.execute(question, file, self.trials, resources)
         return self._print(file)
+
+    def _run_on_cluster(self, question: Question, file: SweepFile) -> None:
+        """Trains and plays on a cluster what the trials lack; a trial that fails there is left for this process."""
+        from dextron_bench.cluster import trials
+        from dextron_bench.sweeps import execution
+        from dextron_bench.sweeps.sweep import BadSweep
+
+        if not question.trials_are_independent:
+            raise BadSweep(
+                "with --cluster trials run side by side, and with --sampler tpe or gp and with --prune they depend on "
+                "earlier ones: leave those out, or leave out --cluster"
+            )
+        groups = execution.runs_ahead(question, file, self.trials, self.runs)
+        with clusters.connected(self.cluster, self.runs, self.threads) as cluster:
+            with progress_bar("epochs", self.quiet) as progress:
+                groups = trials.train(cluster, groups, self.runs, self.device, progress)
+            with progress_bar("pieces", self.quiet) as progress:
+                trials.play(cluster, groups, self.runs, progress)
 
     def _question(self) -> Question:
         """What the flags ask."""

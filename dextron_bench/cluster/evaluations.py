@@ -23,11 +23,10 @@ def play(cluster: RayCluster, runs: Sequence[plans.Run], folder: Path, progress:
 
     `progress` receives pieces. Raises the errors of `execution.prepare`, `EvaluationJob.done` and `RayCluster.run`.
     """
-    tasks = [task for run in runs for task in _tasks(run, folder, cluster.threads)]
-    cluster.run_all(tasks, progress)
+    cluster.run_all([task for run in runs for task in tasks_of(run, folder, cluster.threads)], progress)
 
 
-def _tasks(run: plans.Run, folder: Path, threads: int) -> Iterator[Task]:
+def tasks_of(run: plans.Run, folder: Path, threads: int) -> Iterator[Task]:
     """A task for each piece of a run that is not done."""
     job = execution.prepare(run, folder)
     inputs = imported_reaches(run.source)

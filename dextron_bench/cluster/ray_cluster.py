@@ -174,12 +174,12 @@ class RayCluster:
             self.losses += 1
             self._lost[task.name] = self._lost.get(task.name, 0) + 1
             if self._lost[task.name] >= LOSSES:
-                raise PieceFailed(f"{task.name}: {LOSSES} nodes were lost while they did it") from error
+                raise PieceFailed(task.name, f"{LOSSES} nodes were lost while they did it") from error
             return None
         except errors.WorkerCrashedError as error:
-            raise PieceFailed(f"{task.name}: its process crashed; it is not tried again") from error
+            raise PieceFailed(task.name, "its process crashed; it is not tried again") from error
         except errors.RayError as error:
-            raise PieceFailed(f"{task.name}: {' '.join(str(error).split())}") from error
+            raise PieceFailed(task.name, " ".join(str(error).split())) from error
         return self._checked(task, reply)
 
     def _checked(self, task: Task, reply: Reply) -> Reply:
@@ -187,7 +187,7 @@ class RayCluster:
         if reply.is_refusal:
             raise OtherVersion(reply.error)
         if reply.error:
-            raise PieceFailed(f"{task.name}, on node {reply.node}: {reply.error}") from RemoteError(reply.traceback)
+            raise PieceFailed(task.name, reply.error, reply.node) from RemoteError(reply.traceback)
         return reply
 
 

@@ -22,7 +22,11 @@ class OtherVersion(ValueError):
 
 
 class PieceFailed(RuntimeError):
-    """A piece that raised an error on its node, which another try would only repeat."""
+    """A piece, by the name of its task, that raised an error on its node, which another try would only repeat."""
+
+    def __init__(self, task: str, why: str, node: str = "") -> None:
+        super().__init__(f"{task}{f', on node {node}' if node else ''}: {why}")
+        self.task = task
 
 
 # What a task calls on its node: perform(runs, threads, **arguments). It does the piece in the folder `runs` and returns

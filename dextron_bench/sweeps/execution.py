@@ -69,6 +69,22 @@ def execute(sweep: Sweep, file: SweepFile, most: int, resources: Resources) -> N
             resources.ended(number, trials[number])
 
 
+def runs_ahead(sweep: Sweep, file: SweepFile, most: int, runs: Path) -> list[list[Run]]:
+    """The runs of all trials that have not ended, a group for each, of a sweep whose trials are independent.
+
+    Trials whose settings the method refuses are left out. Raises BadSweep and the errors of `Sweep.question`.
+    """
+    trials = file.begin(sweep.question())
+    trials += [Trial(sweep.propose([Trial({})] * number)) for number in range(len(trials), sweep.trials(most))]
+    groups: dict[str, list[Run]] = {}
+    for trial in trials:
+        settings = space.restored(sweep.space, trial.settings)
+        if trial.state not in ENDED and (name := _run_name(sweep, settings, runs)):
+            run = beside_other_code(resolve(sweep.plan(settings)), runs)
+            groups[name] = [run.with_seed(seed) for seed in sweep.seeds]
+    return list(groups.values())
+
+
 class _Attempt:
     """One attempt at a trial, after the `earlier` ones."""
 

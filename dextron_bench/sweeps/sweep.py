@@ -63,6 +63,11 @@ class Sweep:
         """The number of trials: all combinations of a grid, or `most`."""
         return len(self._grid()) if self.sampler == "grid" else most
 
+    @property
+    def trials_are_independent(self) -> bool:
+        """True if no trial depends on what earlier ones scored, so that all can run side by side."""
+        return self.sampler in ("grid", "random") and not self.prune
+
     def propose(self, earlier: list[Trial]) -> dict[str, Any]:
         """The settings of the next trial; depends on nothing but the question and the earlier trials."""
         number = len(earlier)

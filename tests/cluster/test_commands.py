@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,12 +13,23 @@ from dextron_bench.cluster import ray_cluster, trainings, worker
 from dextron_bench.experts import montecarlo
 from dextron_bench.success import generation
 from tests.cli.test_shares import contents, on_machine
+from tests.cli.test_sweep import AGENT
 from tests.helpers import tiny_benchmark, tiny_cluster, tiny_training
 from tests.helpers.immediate_cluster import ImmediateCluster
 from tests.helpers.tiny_runs import constant_agent
 from tests.helpers.tiny_training import TOY
 
 CLUSTER = ("--cluster", "local")
+BREAKING = """
+from dataclasses import dataclass, replace
+from tests.helpers.toy_learner import Toy
+
+@dataclass(frozen=True)
+class Breaking(Toy):
+    def trainer(self, track, seeds):
+        breaks = 1 if self.rate == 0.2 else 0
+        return super(Breaking, replace(self, breaks=breaks)).trainer(track, seeds)
+"""
 
 
 @pytest.fixture
@@ -102,3 +114,25 @@ def test_a_board_is_verified_as_without_a_cluster(here: Path, capsys: pytest.Cap
     assert "DIFFERS from its episodes" in printed
     assert main.main([*words, *CLUSTER]) == 1
     assert capsys.readouterr().out == printed
+
+
+def test_a_sweep_has_the_same_trials_and_goes_on_without_those_that_fail(here: Path):
+    """One of three trainings raises an error; of three distances, the agent raises one at one, and refuses one."""
+    (here / "mine.py").write_text(AGENT)
+    (here / "breaking.py").write_text(BREAKING)
+    learner = ("sweep", "--method", "breaking.py:Breaking", "--preset", "quick", "--quiet", "--seed", "0", "3")
+    learner += ("--name", "rates")
+    agent = ("sweep", "--method", "mine.py:Mine", "--quiet", "--name", "distances", "--grid", "near=0.5,-1,2")
+    for words in ((*learner, "--grid", "rate=0.1,0.2,0.3"), agent):
+        assert main.main([*words, "--threads", "1", "--runs", "whole"]) == 3
+        assert main.main([*words, *CLUSTER]) == 3
+    for name, states in (("rates", ["done", "failed", "done"]), ("distances", ["done", "failed", "failed"])):
+        files = [here / runs / f"sweeps/{name}/sweep.json" for runs in ("runs", "whole")]
+        trials, others = ([{**trial, "error": ""} for trial in json.loads(f.read_text())["trials"]] for f in files)
+        assert trials == others
+        assert [trial["state"] for trial in trials] == states
+
+
+def test_a_sweep_whose_trials_depend_on_earlier_ones_is_refused(here: Path, complaint: Callable[..., str]):
+    words = ("sweep", "--method", TOY, "--search", "rate=0.1..1", "--sampler", "tpe", "--quiet", *CLUSTER)
+    assert "leave those out, or leave out --cluster" in complaint(*words)
