@@ -26,6 +26,7 @@ SETTINGS = {  # Of Ray, unless the user sets others.
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     "RAY_raylet_start_wait_time_s": "300",  # A busy machine starts slowly.
     "RAY_agent_register_timeout_ms": "300000",
+    "RAY_worker_niceness": "0",  # With Ray's 15, tasks hardly get a processor beside other work.
 }
 WAITING = 2.0  # Tasks in the cluster for each that can run, so that no processor waits for the driver.
 PERIOD = 1.0  # [s] at most until nodes that have joined get tasks.
