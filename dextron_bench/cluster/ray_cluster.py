@@ -80,15 +80,16 @@ class RayCluster:
                 time.sleep(SETTLING)
             self._ray.shutdown()
 
-    def run(self, next_task: Next, done: Done) -> None:
+    def run(self, next_task: Next, done: Done, waiting: Callable[[], None] = lambda: None) -> None:
         """Does all tasks that `next_task` returns, until it returns None while none is under way.
 
-        The tasks of a node that is lost are done again. If the work ends early, by `done` or an error, the tasks under
-        way are cancelled. Raises PieceFailed, OtherVersion, BadCluster, DamagedFile.
+        `waiting` is called each PERIOD. The tasks of a node that is lost are done again. If the work ends early, by
+        `done` or an error, the tasks under way are cancelled. Raises PieceFailed, OtherVersion, BadCluster, DamagedFile.
         """
         again: deque[Task] = deque()
         try:
             while self._fill(next_task, again):
+                waiting()
                 for task, reply in self._replies():
                     if reply is None:
                         again.append(task)
@@ -102,15 +103,17 @@ class RayCluster:
     def run_all(self, tasks: Sequence[Task], progress: Progress = no_progress) -> None:
         """Does tasks; `progress` receives how many are done. Raises the errors of `run`."""
         left, count = deque(tasks), 0
-        progress(count, len(tasks))
 
         def done(_: Task) -> bool:
             nonlocal count
             count += 1
-            progress(count, len(tasks))
+            report()
             return False
 
-        self.run(lambda _: left.popleft() if left else None, done)
+        def report() -> None:
+            progress(count, len(tasks))
+
+        self.run(lambda _: left.popleft() if left else None, done, report)
 
     def _fill(self, next_task: Next, again: deque[Task]) -> bool:
         """Submits tasks while there is room, the tasks of lost nodes first; False if none is under way then."""

@@ -111,7 +111,8 @@ def test_a_piece_of_a_lost_node_is_done_before_new_ones(tmp_path: Path):
     tasks = [Task(name, threads_of_libraries, {}) for name in "abcd"]
     cluster.run_all(tasks, lambda done, total, note="": counts.append((done, total)))
     assert cluster.order == ["a", "b", "c", "b", "d", "b"]
-    assert counts == [(0, 4), (1, 4), (2, 4), (3, 4), (4, 4)]
+    assert list(dict.fromkeys(counts)) == [(0, 4), (1, 4), (2, 4), (3, 4), (4, 4)]
+    assert counts.count((3, 4)) > 1  # Reported again while the last piece is under way.
 
 
 def test_a_content_is_stored_once_until_others_crowd_it_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
