@@ -84,7 +84,8 @@ class RayCluster:
         """Does all tasks that `next_task` returns, until it returns None while none is under way.
 
         `waiting` is called each PERIOD. The tasks of a node that is lost are done again. If the work ends early, by
-        `done` or an error, the tasks under way are cancelled. Raises PieceFailed, OtherVersion, BadCluster, DamagedFile.
+        `done` or an error, the tasks under way are cancelled. Raises PieceFailed, OtherVersion, BadCluster,
+        DamagedFile.
         """
         again: deque[Task] = deque()
         try:
