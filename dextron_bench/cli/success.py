@@ -125,7 +125,7 @@ class Train:
         training_info = tensors.read_about(folder / training.MODEL)
         best = training_info["curve"][training_info["best_epoch"] - 1]
         columns = ["epoch", "loss", "accuracy", "test_loss", "test_accuracy"]
-        print_table("the best epoch on held-out episodes", columns, [[best[column] for column in columns]])
+        print_table("the best epoch on held-out settings", columns, [[best[column] for column in columns]])
         print(folder / training.MODEL)
         return DONE
 

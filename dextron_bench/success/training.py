@@ -22,7 +22,7 @@ from dextron_bench.success.network import CLIP, SIZES, SuccessModel
 STATE = "fit.safetensors"  # In the folder of a data set: all that an unfinished training needs to continue.
 MODEL = "model.safetensors"  # In the same folder: the trained model.
 SCALE_ROWS = 100_000  # Transitions that give mean and deviation of the states.
-TEST_ROWS = 50_000  # Transitions of held-out episodes for each point of the learning curve.
+TEST_ROWS = 50_000  # Transitions of held-out settings for each point of the learning curve.
 ADAM_STATE = ("step", "exp_avg", "exp_avg_sq")
 
 
@@ -53,9 +53,9 @@ class TrainingConfig:
 def train(folder: Path, config: TrainingConfig, progress: Progress = no_progress) -> SuccessModel:
     """Trains on the data set in a folder, or continues a training that was stopped there; returns the model.
 
-    The model is from the epoch with the lowest loss on the held-out episodes, because later epochs overfit and become
-    overconfident. The folder then holds the model and its learning curve: loss and accuracy on training and held-out
-    episodes after each epoch. A call that was stopped, or that had fewer epochs, ends with the same bytes when it is
+    The model is from the epoch with the lowest loss on the held-out settings, because later epochs overfit and become
+    overconfident. The folder then holds the model and its learning curve: loss and accuracy on learned and held-out
+    settings after each epoch. A call that was stopped, or that had fewer epochs, ends with the same bytes when it is
     repeated. `progress` receives epochs. Raises FolderMismatch, EmptyDataset, BadDataset, BadTensors.
     """
     run = _TrainingRun(folder, config)
@@ -123,7 +123,7 @@ class _TrainingRun:
             self.best = self.arrays()
 
     def _test(self) -> dict[str, float]:
-        """Loss and accuracy on held-out episodes."""
+        """Loss and accuracy on held-out settings."""
         states, actions, outcomes = self._test_data.take(self._rng(3).integers(len(self._test_data), size=TEST_ROWS))
         with torch.inference_mode():
             logits, labels = self._network(self._inputs(states, actions)), torch.tensor(outcomes)
@@ -137,11 +137,11 @@ class _TrainingRun:
 
     @property
     def best_epoch(self) -> int:
-        """The epoch with the lowest loss on held-out episodes so far."""
+        """The epoch with the lowest loss on held-out settings so far."""
         return int(min(self.curve, key=lambda point: point["test_loss"])["epoch"])
 
     def note(self) -> str:
-        """A note on the progress: the last accuracy on held-out episodes."""
+        """A note on the progress: the last accuracy on held-out settings."""
         return f"held-out accuracy {100 * self.curve[-1]['test_accuracy']:.1f} %" if self.curve else ""
 
     def about(self) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def without_parts(labels: Collection[str]) -> list[str]:
 
 
 def success_curve(points: list[dict[str, float]], file: Path) -> None:
-    """Draws loss and accuracy of the success model on training and held-out episodes against epochs (paper, Fig. 4b).
+    """Draws loss and accuracy of the success model on learned and held-out settings against epochs (paper, Fig. 4b).
 
     Raises UnknownFormat, OSError.
     """
@@ -84,7 +84,7 @@ def success_curve(points: list[dict[str, float]], file: Path) -> None:
     figure = Figure(figsize=(8, 3.5), layout="constrained")
     table = pd.DataFrame(points).set_index("epoch")
     for axes, name in zip(figure.subplots(1, 2), ("loss", "accuracy"), strict=True):
-        axes.plot(table.index, table[name], label="episodes learned from")
+        axes.plot(table.index, table[name], label="settings learned from")
         axes.plot(table.index, table[f"test_{name}"], label="held out")
         axes.set(xlabel="epoch", ylabel="cross entropy" if name == "loss" else name)
         axes.legend(fontsize=8)
