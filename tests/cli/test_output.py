@@ -48,6 +48,7 @@ def test_a_bar_shows_count_rate_and_time_left(monkeypatch: pytest.MonkeyPatch):
 def test_no_bar_appears_without_a_terminal_or_when_quiet(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ):
+    monkeypatch.setattr(output._Lines, "printed", None)  # No earlier report of this process is a minute old.
     with output.progress_bar("rows") as progress:
         progress(1, 2)
     terminal = Terminal()
