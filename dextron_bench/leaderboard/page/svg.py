@@ -11,6 +11,8 @@ WIDTH, HEIGHT, MARGIN = 168, 16, 4  # Of an estimate's drawing; a score of 0 is 
 INK = re.compile(r"#010203|#000000|#333333")  # Replaced by the colour of the page's text.
 LONG_NUMBER = re.compile(r"-?\d+\.\d{4,}")
 DROPPED = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|<style.*?</style>", re.DOTALL)
+ID = re.compile(r'\bid="([^"]*)"')
+REFERENCE = re.compile(r'(\bid="|href="#|url\(#)([^")]*)')  # An id, or what refers to one.
 PATH = re.compile(r'\bd="(M[^"]*)"')
 
 
@@ -47,11 +49,16 @@ def picture(svg: str, name: str, label: str) -> Html:
     body = DROPPED.sub("", svg[svg.index("<svg") :])
     body = INK.sub("currentColor", LONG_NUMBER.sub(lambda match: f"{float(match[0]):.1f}", body))
     body = PATH.sub(lambda match: f'd="{_simplified(match[1])}"', body)
-    body = re.sub(r'\bid="', f'id="{name}-', body)
-    body = re.sub(r'href="#', f'href="#{name}-', body).replace("url(#", f"url(#{name}-")
+    body = _numbered(body, name)
     box = re.search(r'viewBox="[^"]+"', body)
     opening = tag("svg", role="img", aria_label=label, focusable="false")[: -len("></svg>")]
     return Html(f"{opening} {box[0] if box else ''}>{body[body.index('>') + 1 :].strip()}")
+
+
+def _numbered(body: str, name: str) -> str:
+    """An SVG with ids `name`-0, `name`-1, ...: matplotlib makes its ids from the last bits of a layout."""
+    numbers = {identity: number for number, identity in enumerate(dict.fromkeys(ID.findall(body)))}
+    return REFERENCE.sub(lambda match: f"{match[1]}{name}-{numbers.get(match[2], match[2])}", body)
 
 
 def _simplified(path: str) -> str:
