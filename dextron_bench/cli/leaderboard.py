@@ -171,6 +171,7 @@ def print_robustness(results: Iterable[dict[str, Any]]) -> None:
         lines = [
             [
                 row.method,
+                str(row.seeds),
                 f"{row.plain:.2f}",
                 *(_under_track(row, name) for name in names),
                 "" if math.isnan(row.area) else f"{row.area:.3f}",
@@ -178,7 +179,7 @@ def print_robustness(results: Iterable[dict[str, Any]]) -> None:
             for row in group
         ]
         title = f"tracks: {reaches} reaches, split {split}, mean return and loss [95 %]"
-        print_table(title, ["method", "plain", *names, "area"], lines)
+        print_table(title, ["method", "seeds", "plain", *names, "area"], lines)
 
 
 def _under_track(row: Robustness, name: str) -> str:

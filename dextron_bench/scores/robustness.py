@@ -19,7 +19,7 @@ from dextron_bench.world import task
 class Robustness:
     """What a method scores on a split under tracks.
 
-    `plain` is its mean return without a track. `returns` and `losses` are, by track, the mean return and how much
+    `seeds` have played some track, and `plain` is their mean return without one. `returns` and `losses` are, by track, the mean return and how much
     lower it is; seeds and settings are paired, so the interval is of the differences. `area` is the mean of the return
     over delays from 0 to 300 ms, divided by the return of a success; NaN if some delay was not played.
     """
@@ -27,6 +27,7 @@ class Robustness:
     reaches: str
     split: str
     method: str
+    seeds: int
     plain: float
     returns: Mapping[str, float]
     losses: Mapping[str, statistics.Estimate]
@@ -56,7 +57,7 @@ def area(plain: float, returns: Mapping[str, float]) -> float:
 
 
 def _robustness(reaches: str, split: str, method: str, seeds: list[Mapping[str, list[float]]]) -> Robustness:
-    plain = np.array([seed[split] for seed in seeds], float)
+    plain = float(np.mean([seed[split] for seed in seeds]))
     returns, losses = {}, {}
     for track in TRACKS:
         name = f"{split}{PLUS}{track}"
@@ -65,7 +66,7 @@ def _robustness(reaches: str, split: str, method: str, seeds: list[Mapping[str, 
             under, without = (np.array(part, float) for part in zip(*both, strict=True))
             returns[track] = float(under.mean())
             losses[track] = statistics.estimate(without - under, (-task.SUCCESS, task.SUCCESS))
-    return Robustness(reaches, split, method, float(plain.mean()), returns, losses, area(float(plain.mean()), returns))
+    return Robustness(reaches, split, method, len(seeds), plain, returns, losses, area(plain, returns))
 
 
 def _base(name: str) -> str:

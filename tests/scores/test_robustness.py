@@ -33,7 +33,7 @@ def test_only_seeds_that_played_both_are_compared():
         result("a", 2, test=[5.0]),
     ]
     [row] = robustness.table(seeds)
-    assert (row.plain, row.returns["sensing-1"], row.losses["sensing-1"].mean) == (10.0, 5.0, 5.0)
+    assert (row.seeds, row.plain, row.returns["sensing-1"], row.losses["sensing-1"].mean) == (2, 10.0, 5.0, 5.0)
 
 
 def test_the_area_over_delays_by_hand():

@@ -24,13 +24,14 @@ def matrices(results: Iterable[dict[str, Any]]) -> Iterator[tuple[str, str, str,
 
 def _matrix(title: str, rows: Sequence[Robustness]) -> Html:
     names = [name for name in TRACKS if any(name in row.returns for row in rows)]
-    heads = ("return", "plain", *names, "area over delays")
+    heads = ("return", "seeds", "plain", *names, "area over delays")
     head = tag("tr", *(tag("th", text, scope="col") for text in heads))
     body = (tag("tr", tag("th", row.method, scope="row"), *_cells(row, names)) for row in rows)
     return tag("table", tag("caption", title), tag("thead", head), tag("tbody", *body), class_="heat")
 
 
 def _cells(row: Robustness, names: Sequence[str]) -> Iterator[Html]:
+    yield tag("td", str(row.seeds))
     yield _cell(row.plain)
     for name in names:
         if name not in row.returns:

@@ -23,10 +23,10 @@ def test_cells_have_the_mean_return_and_the_loss():
     ((reaches, split, title, matrix),) = tracks.matrices(results)
     assert (reaches, split, title) == ("synthetic", "test", "Return under tracks, test of synthetic reaches")
     heads = re.findall(r'<th scope="col">([^<]*)</th>', matrix)
-    assert heads == ["return", "plain", "delay-40", "bottle-mass", "area over delays"]
+    assert heads == ["return", "seeds", "plain", "delay-40", "bottle-mass", "area over delays"]
     rows = dict(re.findall(r'<th scope="row">([^<]*)</th>(.*?)</tr>', matrix))
-    assert re.findall(r">([^<]+)</td>", rows["a"]) == ["20.0", "12.5", "5.0", UNKNOWN]
-    assert re.findall(r">([^<]+)</td>", rows["b&lt;"]) == ["10.0", "10.0", UNKNOWN, UNKNOWN]
+    assert re.findall(r">([^<]+)</td>", rows["a"]) == ["2", "20.0", "12.5", "5.0", UNKNOWN]
+    assert re.findall(r">([^<]+)</td>", rows["b&lt;"]) == ["1", "10.0", "10.0", UNKNOWN, UNKNOWN]
     assert re.findall(r"--rate:(\d+)%", rows["a"]) == ["100", "62", "25"]
     assert 'title="loses 7.50, 95 % interval' in rows["a"]
     assert 'title="loses 0.00, 95 % interval 0.00 to 0.00"' in rows["b&lt;"]
