@@ -151,9 +151,10 @@ STEPS: tuple[Step, ...] = (
         (
             "figures --reaches real --into docs/pictures",
             "windows reflex stopping --reaches real --into docs/pictures/windows-real.png",
+            "windows stopping reflex --reaches real --rows 200 --failed --into docs/pictures/failures-real.png",
         ),
         needs=(f"{DATA}/*", "leaderboard/results/*/*/*/*.json", f"{WEIGHTS}/stopping/real/seed0.safetensors"),
-        makes=("docs/pictures/fig*.png", "docs/pictures/h*.png", "docs/pictures/windows-real.png"),
+        makes=tuple(f"docs/pictures/{name}.png" for name in ("fig*", "h*", "windows-real", "failures-real")),
     ),
     Step(
         "fresh",

@@ -14,7 +14,10 @@ from dextron_bench.cli.success_eval import NoRows
 from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from dextron_bench.evaluation.closing_windows import Choice, Window
+    from dextron_bench.experts.policies import Case
     from dextron_bench.methods.agents import Agent
     from dextron_bench.splits.loading import Split
 
@@ -39,6 +42,8 @@ class Windows:
     """The split."""
     rows: int = 20
     """How many settings of it, from the first."""
+    failed: bool = False
+    """Show only the settings of these in which one of the agents fails."""
     into: Annotated[Path, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = Path("figures/windows.png")
     """The file for the picture."""
     threads: int = 0
@@ -57,15 +62,17 @@ class Windows:
             raise NoRows(f"--rows must be 1 or more, not {self.rows}")
         pictures.check_format(self.into)
         split, source = load_split(self.reaches, self.split), open_source(self.reaches)
-        cases = split.cases[: self.rows]
+        cases = dict(enumerate(split.cases[: self.rows]))
         agents: dict[str, Agent] = {EXPERT: ExpertAgent(), **dict(map(self._agent, self.agents))}
         choices = {}
         with progress_bar("windows", self.quiet) as report:
-            report(0, 1 + len(agents), "forked openings")
-            windows = closing_windows.play_windows(source, cases, self.threads)
-            for number, (name, agent) in enumerate(agents.items(), 1):
+            for number, (name, agent) in enumerate(agents.items()):
                 report(number, 1 + len(agents), name)
                 choices[name] = closing_windows.play_choices(agent, source, cases, self.threads)
+            if self.failed:
+                cases = _failed(cases, [one for name, one in choices.items() if name != EXPERT])
+            report(len(agents), 1 + len(agents), "forked openings")
+            windows = closing_windows.play_windows(source, cases, self.threads)
         self.into.parent.mkdir(parents=True, exist_ok=True)
         title = f"When closing works, and when agents close: {self.split} of {self.reaches} reaches"
         episodes.windows(windows, choices, title, self.into)
@@ -84,10 +91,18 @@ class Windows:
         return weights.agent_by_name(name, self.reaches)
 
 
-def _print(split: Split, windows: list[Window], choices: dict[str, list[Choice]]) -> None:
+def _failed(cases: Mapping[int, Case], choices: Sequence[Mapping[int, Choice]]) -> dict[int, Case]:
+    """The cases in which some agent failed; raises NoRows if there is none."""
+    failed = {row: case for row, case in cases.items() if not all(one[row].success for one in choices)}
+    if not failed:
+        raise NoRows(f"no agent failed in any of the {len(cases)} settings; leave out --failed, or give more --rows")
+    return failed
+
+
+def _print(split: Split, windows: Mapping[int, Window], choices: Mapping[str, Mapping[int, Choice]]) -> None:
     """A row for each setting: the first and the last moment that works, and the choices; a failure has an `x`."""
     rows = []
-    for row, window in enumerate(windows):
+    for row, window in windows.items():
         working = window.times[window.works]
         span = f"{working[0]:.2f} to {working[-1]:.2f}" if working.size else "never"
         cells = [f"{one[row].time:.2f}{'' if one[row].success else ' x'}" for one in choices.values()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,16 +39,16 @@ class Choice:
     success: bool
 
 
-def play_windows(source: Source, cases: Sequence[Case], threads: int = 0) -> list[Window]:
-    """The window of each case's setting."""
-    played = openings.play(source, [case.setting for case in cases], threads)
-    return [_window(outcomes) for _, outcomes in played]
+def play_windows(source: Source, cases: Mapping[int, Case], threads: int = 0) -> dict[int, Window]:
+    """The window of each case's setting, by row of the split."""
+    played = openings.play(source, [case.setting for case in cases.values()], threads)
+    return {row: _window(outcomes) for row, (_, outcomes) in zip(cases, played, strict=True)}
 
 
-def play_choices(agent: Agent, source: Source, cases: Sequence[Case], threads: int = 0) -> list[Choice]:
-    """The choice of an agent in each case; raises AgentError."""
-    episodes = dict(rollout(agent, source, cases, threads=threads))
-    return [choice(episodes[row]) for row in range(len(cases))]
+def play_choices(agent: Agent, source: Source, cases: Mapping[int, Case], threads: int = 0) -> dict[int, Choice]:
+    """The choice of an agent in each case, by row of the split; raises AgentError."""
+    episodes = dict(rollout(agent, source, list(cases.values()), threads=threads))
+    return {row: choice(episodes[place]) for place, row in enumerate(cases)}
 
 
 def choice(episode: Episode) -> Choice:

@@ -19,9 +19,10 @@ from dextron_bench.world import task
 class Robustness:
     """What a method scores on a split under tracks.
 
-    `seeds` have played some track, and `plain` is their mean return without one. `returns` and `losses` are, by track, the mean return and how much
-    lower it is; seeds and settings are paired, so the interval is of the differences. `area` is the mean of the return
-    over delays from 0 to 300 ms, divided by the return of a success; NaN if some delay was not played.
+    `seeds` have played some track, and `plain` is their mean return without one. `returns` and `losses` are, by track,
+    the mean return and how much lower it is; seeds and settings are paired, so the interval is of the differences.
+    `area` is the mean of the return over delays from 0 to 300 ms, divided by the return of a success; NaN if some delay
+    was not played.
     """
 
     reaches: str

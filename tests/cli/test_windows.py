@@ -29,3 +29,13 @@ def test_an_error_is_one_line(tiny_world: Path, complaint: Callable[..., str]):
     assert "no picture format '.gif'" in complaint("windows", "--into", "windows.gif")
     assert "no method 'nix'" in complaint("windows", "nix")
     assert "No such file" in complaint("windows", "nix.safetensors")
+
+
+def test_only_failures_are_shown_if_wanted(
+    tiny_world: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
+):
+    words = ["windows", "--split", "val", "--threads", "1", "--quiet", "--failed", "--into", "windows.svg"]
+    assert main.main([*words, "nothing", "exp"]) == 0
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("│")]
+    assert row.split("│")[5].strip() == "nan x"
+    assert "no agent failed in any of the 1 settings" in complaint(*words, "exp")

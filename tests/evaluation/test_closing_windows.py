@@ -64,9 +64,9 @@ def test_a_hand_that_never_closes_has_no_choice(monkeypatch: pytest.MonkeyPatch)
 
 def test_the_choice_of_an_agent_that_closes_once_is_its_first_closing_action_and_its_window_predicts_it():
     """`reflex` opens and closes at full speed, as a fork does, so the window says how its episode ends."""
-    (window,) = closing_windows.play_windows(SOURCE, [CASE], threads=1)
+    window = closing_windows.play_windows(SOURCE, {7: CASE}, threads=1)[7]
     for near in (0.065, 0.15):
-        (choice,) = closing_windows.play_choices(Reflex(near).agent(0), SOURCE, [CASE], threads=1)
+        choice = closing_windows.play_choices(Reflex(near).agent(0), SOURCE, {7: CASE}, threads=1)[7]
         ((_, played),) = rollout(Reflex(near).agent(0), SOURCE, [CASE], threads=1)
         assert choice.time == pytest.approx(0.02 * int(np.argmax(played.actions[:, 0] > 0.0)))
         nearest = int(np.argmin(np.abs(window.times - choice.time)))

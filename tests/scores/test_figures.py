@@ -49,17 +49,17 @@ def test_windows_are_drawn_also_for_settings_that_never_work_and_for_hands_that_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     never = np.zeros(0)
-    windows = [
-        Window(np.array([1.0, 1.04, 1.08]), np.array([False, True, False])),
-        Window(np.array([2.0]), np.array([False])),
-        Window(never, never.astype(bool)),
-    ]
-    choices = {"rule": [Choice(1.04, True), Choice(2.0, False), Choice(np.nan, False)]}
+    windows = {
+        3: Window(np.array([1.0, 1.04, 1.08]), np.array([False, True, False])),
+        5: Window(np.array([2.0]), np.array([False])),
+        8: Window(never, never.astype(bool)),
+    }
+    choices = {"rule": {3: Choice(1.04, True), 5: Choice(2.0, False), 8: Choice(np.nan, False)}}
     drawn: list[Figure] = []
     monkeypatch.setattr(episodes, "save", lambda figure, file, dpi: drawn.append(figure))
     episodes.windows(windows, choices, "title", tmp_path / "windows.svg")
     (axes,) = drawn[0].axes
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["0", "1", "2"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["3", "5", "8"]
     marks = [(line.get_xdata()[0], line.get_markerfacecolor()) for line in axes.lines[:2]]  # type: ignore[index]
     assert marks == [(pytest.approx(0.04), "C0"), (0.0, "white")]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,8 +46,8 @@ def ridges(episodes: dict[str, PredictedEpisode], file: Path) -> None:
     save(figure, file, 150)
 
 
-def windows(windows: Sequence[Window], choices: Mapping[str, Sequence[Choice]], title: str, file: Path) -> None:
-    """Draws a bar for each setting, green while closing works, with a marker where each agent began to close.
+def windows(windows: Mapping[int, Window], choices: Mapping[str, Mapping[int, Choice]], title: str, file: Path) -> None:
+    """Draws a bar for each row of a split, green while closing works, with a marker where each agent began to close.
 
     Settings are in the order in which closing begins to work, and 0 s is the first moment that was tried. A filled
     marker is a success. A setting whose hand never came near has no bar. Raises UnknownFormat, OSError.
@@ -55,7 +55,7 @@ def windows(windows: Sequence[Window], choices: Mapping[str, Sequence[Choice]], 
     check_format(file)
     figure = Figure(figsize=(8, 1.6 + 0.28 * len(windows)), layout="constrained")
     axes = figure.add_subplot()
-    order = sorted(range(len(windows)), key=lambda row: _first_working(windows[row]))
+    order = sorted(windows, key=lambda row: _first_working(windows[row]))
     for height, row in enumerate(order):
         window = windows[row]
         if not window.times.size:

@@ -12,8 +12,10 @@ DRAWN = """<?xml version="1.0"?>
 def test_ids_are_numbered_and_references_follow() -> None:
     picture = svg.picture(DRAWN.format(clip="p1f", mark="m2e"), "curves", "label")
     assert '<g id="curves-0">' in picture
-    assert 'clip-path="url(#curves-1)"' in picture and '<clipPath id="curves-1"/>' in picture
-    assert 'href="#curves-2"' in picture and '<path id="curves-2"/>' in picture
+    assert 'clip-path="url(#curves-1)"' in picture
+    assert '<clipPath id="curves-1"/>' in picture
+    assert 'href="#curves-2"' in picture
+    assert '<path id="curves-2"/>' in picture
 
 
 def test_layouts_that_differ_in_last_bits_give_equal_pictures() -> None:
