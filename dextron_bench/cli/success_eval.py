@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from dextron_bench.cli.success import folder_of
 from dextron_bench.reaches.sources import RankedSource
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from dextron_bench.experts.policies import Case
     from dextron_bench.success.exemplars import PredictedEpisode
@@ -128,36 +129,37 @@ class Explain:
 
 def _print_markdown(rows: Sequence[Mapping[str, Any]]) -> None:
     """Prints three tables: the scores, the AUC by time, and the calibration on the first split."""
-    import numpy as np
-
-    from dextron_bench.storage import tensors
-
-    def agent(row: Mapping[str, Any]) -> str:
-        return row["player"] if row["player"] == EXPERTS else tensors.read_about(Path(row["player"]))["label"]
-
-    def number(value: float | None, digits: int) -> str:
-        return "" if value is None or np.isnan(value) else f"{value:.{digits}f}"
-
-    columns = ["success [%]", "accuracy [%]", "base-rate accuracy [%]", "Brier", "base-rate Brier"]
-    shares = ("base_rate", "accuracy", "base_accuracy")
-    scores = ("brier", "base_brier", "calibration_error", "auc")
-    print_markdown(
-        ["split", "agent", "transitions", *columns, "calibration error", "AUC"],
-        [
-            [f"`{row['split']}`", agent(row), f"{row['rows']:,}"]
-            + [number(100 * row[name], 1) for name in shares]
-            + [number(row[name], 3) for name in scores]
-            for row in rows
-        ],
-    )
+    heads = ["success [%]", "accuracy [%]", "base-rate accuracy [%]", "Brier", "base-rate Brier", "calibration error"]
+    print_markdown(["split", "agent", "transitions", *heads, "AUC"], [[*_names(row), *_scores(row)] for row in rows])
     print()
     tenths = [f"{10 * k}-{10 * k + 10}" for k in range(10)]
-    by_time = [[f"`{row['split']}`", agent(row), *(number(value, 2) for value in row["auc_by_time"])] for row in rows]
-    print_markdown(["split", "agent", *tenths, "after"], by_time)
+    print_markdown(
+        ["split", "agent", *tenths, "after"], [[*_names(row), *_rounded(row["auc_by_time"])] for row in rows]
+    )
     print()
     first = [row for row in rows if row["split"] == rows[0]["split"]]
     bins = [f"{k / 10:.1f}-{(k + 1) / 10:.1f}" for k in range(10)]
-    print_markdown(["agent", *bins], [[agent(row), *(number(value, 2) for value in row["observed"])] for row in first])
+    print_markdown(["agent", *bins], [[_names(row)[1], *_rounded(row["observed"])] for row in first])
+
+
+def _names(row: Mapping[str, Any]) -> list[str]:
+    """The split and the agent of a row."""
+    from dextron_bench.storage import tensors
+
+    is_expert = row["player"] == EXPERTS
+    return [f"`{row['split']}`", EXPERTS if is_expert else tensors.read_about(Path(row["player"]))["label"]]
+
+
+def _scores(row: Mapping[str, Any]) -> list[str]:
+    """The cells of a row's scores."""
+    shares = [100 * row[name] for name in ("base_rate", "accuracy", "base_accuracy")]
+    scores = [row[name] for name in ("brier", "base_brier", "calibration_error", "auc")]
+    return [f"{row['rows']:,}", *_rounded(shares, 1), *_rounded(scores, 3)]
+
+
+def _rounded(values: Iterable[float | None], digits: int = 2) -> list[str]:
+    """Cells of numbers; empty for None and NaN."""
+    return ["" if value is None or math.isnan(value) else f"{value:.{digits}f}" for value in values]
 
 
 def _print_exemplars(chosen: Mapping[str, PredictedEpisode], cases: Sequence[Case]) -> None:
