@@ -17,7 +17,7 @@ from dextron_bench import Case, ExpertAgent, Track, Trainer
 from dextron_bench.methods.learners import Arrays
 from dextron_bench.world.engine import Engine
 
-EPISODES = 12  # That each agent plays in an epoch: about the 1,000 frames of the paper's epochs.
+EPISODES = 5  # That each agent plays in an epoch: about 1,000 frames, as in the epochs of the paper.
 OWN = BATCH // 2  # States of each batch that the agent met itself; the others are demonstrations.
 
 PLAYED, DEMONSTRATED, MET = 10, 11, 12  # The random streams of each seed.

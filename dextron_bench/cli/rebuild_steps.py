@@ -122,6 +122,7 @@ STEPS: tuple[Step, ...] = (
     *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
     _run("stopping-generated2000", "stopping --generated 2000", "real", SEEDS),
     _run("rlpd-tenth", "rlpd --preset tenth", "real", SEEDS),
+    _run("dagger-tenth", "dagger --preset tenth", "real", SEEDS),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
     _run("rlil-0.1-2q", "rlil --dur 0.1 --critics 2", "real"),  # the seed in which RLIL 0.1 diverges
