@@ -25,6 +25,28 @@ def test_equal_comparisons_give_equal_bytes(suffix: str, tmp_path: Path, monkeyp
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
+@pytest.mark.parametrize("suffix", [".svg", ".png"])
+def test_last_bits_of_a_layout_change_no_byte(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The solver of the layout gives other last bits in other places of the memory."""
+    lay_out = Figure.draw_without_rendering
+
+    def shifted(figure: Figure) -> None:
+        lay_out(figure)
+        for part in figure.subfigs:
+            part.bbox_relative.set_points(part.bbox_relative.get_points() * (1.0 + 1e-13))
+        for axes in figure.axes:
+            axes.set_position(axes.get_position().translated(1e-13, -1e-13))
+
+    files = [tmp_path / f"{name}{suffix}" for name in ("here", "there")]
+    for file in files:
+        figure = Figure(figsize=(4, 4), layout="constrained")
+        for part in figure.subfigures(2, 1):
+            part.subplots().plot([0.0, 1.0], [0.3, 0.7])
+        pictures.save(figure, file, 150)
+        monkeypatch.setattr(Figure, "draw_without_rendering", shifted)
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
 def test_a_picture_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def write_half(self: Figure, file: Path, **options: object) -> None:
         file.write_bytes(b"half")

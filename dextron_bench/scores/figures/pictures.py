@@ -7,13 +7,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox, BboxBase
 
 from dextron_bench.storage import atomic
 
 FORMATS = (".pdf", ".png", ".svg")
 DATES = {".pdf": "CreationDate", ".svg": "Date"}  # Left out, so that equal figures have equal bytes.
+PLACES = 5  # Decimals of the places of axes, in shares of the figure.
 INK = "#010203"  # The page replaces this colour with the colour of its text.
 INLINE: Any = {  # For pictures inside the page: text stays text, and the background is transparent.
     **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
@@ -44,7 +47,8 @@ def inline(draw: Callable[[Path], None]) -> str:
 
 
 def save(figure: Figure, file: Path, dpi: int) -> None:
-    """Writes a figure atomically; equal figures give equal bytes."""
+    """Writes a figure atomically; equal figures give equal bytes. The layout of the figure is fixed from then on."""
+    _lay_out(figure, dpi)
     suffix = file.suffix.lower()
     metadata: Any = {DATES[suffix]: None} if suffix in DATES else None
 
@@ -53,3 +57,19 @@ def save(figure: Figure, file: Path, dpi: int) -> None:
 
     with rc_context({"svg.hashsalt": "dextron-bench"}):
         atomic.write_atomically(file, write)
+
+
+def _lay_out(figure: Figure, dpi: int) -> None:
+    """Lays a figure out and rounds the places of its parts: the last bits of the solver depend on memory addresses."""
+    figure.set_dpi(dpi)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for part in figure.subfigs:
+        part.bbox_relative.set_points(_rounded(part.bbox_relative))
+    for axes in figure.axes:
+        axes.set_position(Bbox(_rounded(axes.get_position(original=True))))
+
+
+def _rounded(box: BboxBase) -> np.ndarray:
+    """The corners (2, 2) of a box in shares of a figure, to less than a pixel."""
+    return np.round(box.get_points(), PLACES)
