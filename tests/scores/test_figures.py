@@ -40,7 +40,7 @@ def test_last_bits_of_a_layout_change_no_byte(suffix: str, tmp_path: Path, monke
     files = [tmp_path / f"{name}{suffix}" for name in ("here", "there")]
     for file in files:
         figure = Figure(figsize=(4, 4), layout="constrained")
-        for part in figure.subfigures(2, 1):
+        for part in figure.subfigures(2, 1, squeeze=False)[:, 0]:
             part.subplots().plot([0.0, 1.0], [0.3, 0.7])
         pictures.save(figure, file, 150)
         monkeypatch.setattr(Figure, "draw_without_rendering", shifted)
