@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING
 
 from dextron_bench.cli.exit_codes import DONE
+from dextron_bench.cli.leaderboard_baselines import BaselineFlags
 from dextron_bench.cli.output import progress_bar
-from dextron_bench.reaches.sources import RankedSource
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dextron_bench.leaderboard.verify_board import Row
 
 
 @dataclass(frozen=True)
-class Fresh:
+class Fresh(BaselineFlags):
     """Let the baselines of the leaderboard play fresh settings, the same for all, and build the leaderboard.
 
     If it is interrupted, the same command continues with the rows that have not played them.
@@ -24,30 +28,19 @@ class Fresh:
     """A public value that did not exist when the baselines were trained; by default the board's, or a random one."""
     rows: int = 0
     """How many fresh settings of each split; 0 means as many as the split has."""
-    method: tuple[str, ...] = ()
-    """Only the rows of these methods."""
-    reaches: tuple[RankedSource, ...] = get_args(RankedSource)
-    """Only rows on these sources; `real` needs the recorded reaches."""
-    board: Path = Path("leaderboard")
-    """Folder of the leaderboard."""
-    threads: int = 0
-    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
-    quiet: bool = False
-    """Show no progress."""
 
     def __call__(self) -> int:
         from dextron_bench.leaderboard import build
 
-        for reaches in self.reaches:
-            self._play(reaches)
+        for reaches, rows in self.baselines().items():
+            self._play(reaches, rows)
         print(*build.build(self.board), sep="\n")
         return DONE
 
-    def _play(self, reaches: str) -> None:
+    def _play(self, reaches: str, rows: Sequence[Row]) -> None:
         """Lets the baselines on one source play, one after the other."""
-        from dextron_bench.leaderboard import fresh_baselines, verify_board
+        from dextron_bench.leaderboard import fresh_baselines
 
-        rows = [row for row in verify_board.rows(self.board, self.method, [reaches]) if not row.run.episodes.exists()]
         with progress_bar(f"fresh settings of {reaches} reaches", self.quiet) as progress:
             fresh, splits = fresh_baselines.load_or_draw(
                 self.board, reaches, self.beacon, self.rows, self.threads, progress

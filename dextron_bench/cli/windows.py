@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dextron_bench.experts.policies import Case
     from dextron_bench.methods.agents import Agent
     from dextron_bench.splits.loading import Split
+    from dextron_bench.storage.progress import Progress
 
 EXPERT = "expert"
 
@@ -52,33 +53,39 @@ class Windows:
     """Show no progress."""
 
     def __call__(self) -> int:
-        from dextron_bench.evaluation import closing_windows
-        from dextron_bench.experts.policies import ExpertAgent
-        from dextron_bench.reaches.sources import open_source
         from dextron_bench.scores.figures import episodes, pictures
         from dextron_bench.splits.loading import load_split
 
         if self.rows < 1:
             raise NoRows(f"--rows must be 1 or more, not {self.rows}")
         pictures.check_format(self.into)
-        split, source = load_split(self.reaches, self.split), open_source(self.reaches)
-        cases = dict(enumerate(split.cases[: self.rows]))
-        agents: dict[str, Agent] = {EXPERT: ExpertAgent(), **dict(map(self._agent, self.agents))}
-        choices = {}
-        with progress_bar("windows", self.quiet) as report:
-            for number, (name, agent) in enumerate(agents.items()):
-                report(number, 1 + len(agents), name)
-                choices[name] = closing_windows.play_choices(agent, source, cases, self.threads)
-            if self.failed:
-                cases = _failed(cases, [one for name, one in choices.items() if name != EXPERT])
-            report(len(agents), 1 + len(agents), "forked openings")
-            windows = closing_windows.play_windows(source, cases, self.threads)
+        split, agents = load_split(self.reaches, self.split), dict(map(self._agent, self.agents))
+        with progress_bar("windows", self.quiet) as progress:
+            windows, choices = self._play(dict(enumerate(split.cases[: self.rows])), agents, progress)
         self.into.parent.mkdir(parents=True, exist_ok=True)
         title = f"When closing works, and when agents close: {self.split} of {self.reaches} reaches"
         episodes.windows(windows, choices, title, self.into)
         _print(split, windows, choices)
         print(self.into)
         return DONE
+
+    def _play(
+        self, cases: dict[int, Case], agents: Mapping[str, Agent], progress: Progress
+    ) -> tuple[dict[int, Window], dict[str, dict[int, Choice]]]:
+        """The window of each case that is shown, by row, and the choices of the expert and of each agent."""
+        from dextron_bench.evaluation import closing_windows
+        from dextron_bench.experts.policies import ExpertAgent
+        from dextron_bench.reaches.sources import open_source
+
+        source, players = open_source(self.reaches), {EXPERT: ExpertAgent(), **agents}
+        choices: dict[str, dict[int, Choice]] = {}
+        for number, (name, agent) in enumerate(players.items()):
+            progress(number, 1 + len(players), name)
+            choices[name] = closing_windows.play_choices(agent, source, cases, self.threads)
+        if self.failed:
+            cases = _failed(cases, [choices[name] for name in agents])
+        progress(len(players), 1 + len(players), "forked openings")
+        return closing_windows.play_windows(source, cases, self.threads), choices
 
     def _agent(self, name: str) -> tuple[str, Agent]:
         """The label and the agent of a name."""

@@ -57,6 +57,11 @@ def test_scores_under_tracks_are_verified(board: Path, capsys: pytest.CaptureFix
     assert "test+delay-300 row 0: says return 7" in capsys.readouterr().out
 
 
+def test_sources_without_rows_are_left_out(board: Path, capsys: pytest.CaptureFixture[str]):
+    assert main.main(["leaderboard", "tracks", "--track", "delay-100", "--board", "board", "--quiet"]) == 0
+    assert "reflex, synthetic reaches, seed 0: 1 of 1 tracks" in capsys.readouterr().out
+
+
 def test_an_unknown_track_is_named(board: Path, capsys: pytest.CaptureFixture[str]):
     assert main.main(words("--track", "delay-7")) == 2
     assert "no track 'delay-7'; choose from delay-40" in capsys.readouterr().err
