@@ -107,7 +107,10 @@ def _failed(cases: Mapping[int, Case], choices: Sequence[Mapping[int, Choice]]) 
 
 
 def _print(split: Split, windows: Mapping[int, Window], choices: Mapping[str, Mapping[int, Choice]]) -> None:
-    """A row for each setting: the first and the last moment that works, and the choices; a failure has an `x`."""
+    """A row for each setting: the first and the last moment that works, and the choices; a failure has an `x`.
+
+    The last line counts in how many of these settings some closing works, and in how many the agents succeed.
+    """
     rows = []
     for row, window in windows.items():
         working = window.times[window.works]
@@ -116,3 +119,6 @@ def _print(split: Split, windows: Mapping[int, Window], choices: Mapping[str, Ma
         rows.append([row, split.cases[row].setting.reach, span, *cells])
     columns = ["row", "reach", "closing works [s]", *(f"{name} [s]" for name in choices)]
     print_table(f"{split.name} of {split.reaches} reaches, version {split.digest[:8]}", columns, rows)
+    solvable = sum(bool(window.works.any()) for window in windows.values())
+    successes = [f"{name} in {sum(one[row].success for row in windows)}" for name, one in choices.items()]
+    print(f"some closing works in {solvable} of {len(windows)} settings; success: {', '.join(successes)}")

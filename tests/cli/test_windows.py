@@ -20,6 +20,7 @@ def test_the_choices_of_a_rule_and_of_the_expert_are_drawn(tiny_world: Path, cap
     assert (number, reach) == ("0", "b")
     first, last = map(float, works.split(" to "))
     assert first < last
+    assert "some closing works in 1 of 1 settings; success: expert in 1, reflex in " in printed
     assert "x" not in expert  # The row's expert scores 20.
     assert (tiny_world / "pictures/windows.svg").read_text().startswith("<?xml")
 
@@ -36,6 +37,8 @@ def test_only_failures_are_shown_if_wanted(
 ):
     words = ["windows", "--split", "val", "--threads", "1", "--quiet", "--failed", "--into", "windows.svg"]
     assert main.main([*words, "nothing", "exp"]) == 0
-    (row,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("│")]
+    printed = capsys.readouterr().out
+    (row,) = [line for line in printed.splitlines() if line.startswith("│")]
     assert row.split("│")[5].strip() == "nan x"
+    assert "success: expert in 1, nothing in 0, exp in 1" in printed
     assert "no agent failed in any of the 1 settings" in complaint(*words, "exp")
