@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 DATA = "dextron_bench/data"
-SPLITS = f"{DATA}/splits*"
+SPLITS = f"{DATA}/splits-*.parquet"
 SEEDS = "0 1 2"
 WEIGHTS = "baselines/weights"
 
@@ -85,7 +85,12 @@ LEARNERS = {  # By label: the flags of the method.
     "rlil-0.1": "rlil --dur 0.1",
     "rlil-0.3": "rlil --dur 0.3",
 }
-SHOWN = ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")  # learners with recordings that ship
+SHOWN = {  # By label: the flags of the learners with recordings that ship, besides SOR and SIM.
+    **{label: LEARNERS[label] for label in ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")},
+    "rlpd-tenth": "rlpd --preset tenth",
+    "dagger-tenth": "dagger --preset tenth",
+    "stopping": "stopping",
+}
 UNDER_TRACKS = ("reflex", "rlil-0.1", "stopping")  # The rule, the paper's best method, and the one that leads.
 RULES = ("reflex", "nothing", "random")
 SIM = f"{WEIGHTS}/sim-0.1/minjerk/*"
@@ -121,8 +126,12 @@ STEPS: tuple[Step, ...] = (
     _quick("sor", "sor", "synthetic", needs=(SIM_QUICK,)),
     *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
     _run("stopping-generated2000", "stopping --generated 2000", "real", SEEDS),
-    _run("rlpd-tenth", "rlpd --preset tenth", "real", SEEDS),
-    _run("dagger-tenth", "dagger --preset tenth", "real", SEEDS),
+    *(
+        _run(f"{method}-tenth", f"{method} --preset tenth", reaches, seeds)
+        for method in ("rlpd", "dagger")
+        for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))
+    ),
+    _run("dagger", "dagger", "real", SEEDS),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
     _run("rlil-0.1-2q", "rlil --dur 0.1 --critics 2", "real"),  # the seed in which RLIL 0.1 diverges
@@ -136,14 +145,13 @@ STEPS: tuple[Step, ...] = (
         "recordings",
         (
             "run --method exp --split test --no-floors --runs {runs}/show",
-            *(_show(LEARNERS[label]) for label in SHOWN),
-            *map(_show, ("sor", "stopping")),
+            *map(_show, (*SHOWN.values(), "sor")),
             _show("sim", "minjerk"),
             "recordings choose --runs {runs}/show --into recordings",
         ),
         needs=(
             *(SPLITS, f"{DATA}/success-synthetic.safetensors", SIM),
-            *(f"{WEIGHTS}/{label}/synthetic/seed0.safetensors" for label in (*SHOWN, "stopping")),
+            *(f"{WEIGHTS}/{label}/synthetic/seed0.safetensors" for label in SHOWN),
         ),
         makes=("recordings/*.rrd",),
     ),
