@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from dextron_bench.cli import main
+from dextron_bench.cli import main, output
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
 from tests.helpers import forged_bundles, tiny_benchmark, tiny_training
@@ -29,6 +29,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="slow tests with many more mutations and kills, and with real fresh settings",
     )
+
+
+@pytest.fixture(autouse=True)
+def no_old_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A test begins as a new process would: no report of an earlier test is a minute old, which prints a line."""
+    monkeypatch.setattr(output._Lines, "printed", None)
 
 
 @pytest.fixture(scope="session")

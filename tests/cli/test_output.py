@@ -48,7 +48,6 @@ def test_a_bar_shows_count_rate_and_time_left(monkeypatch: pytest.MonkeyPatch):
 def test_no_bar_appears_without_a_terminal_or_when_quiet(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ):
-    monkeypatch.setattr(output._Lines, "printed", None)  # No earlier report of this process is a minute old.
     with output.progress_bar("rows") as progress:
         progress(1, 2)
     terminal = Terminal()
@@ -71,7 +70,6 @@ def test_without_a_terminal_a_line_each_minute_says_what_is_done_and_left(
     """100 of 400 were done before; then 20 in the first two minutes: 10 a minute, so 280 take 28 minutes."""
     now = 1000.0
     monkeypatch.setattr(output.time, "monotonic", lambda: now)
-    monkeypatch.setattr(output._Lines, "printed", None)
     with output.progress_bar("rows") as progress:
         progress(100, 400)
         for at, done in (*((1030.0, 105), (1059.0, 109), (1120.0, 120)), *((1150.0, 125), (1180.0, 130))):
@@ -93,7 +91,6 @@ def test_short_pieces_of_work_have_a_line_each_minute_too(
     """Four bars of 25 s each: the third begins 50 s after the first, and prints at 75 s."""
     now = 1000.0
     monkeypatch.setattr(output.time, "monotonic", lambda: now)
-    monkeypatch.setattr(output._Lines, "printed", None)
     for bar in range(4):
         with output.progress_bar(f"piece {bar}") as progress:
             progress(0, 10)
