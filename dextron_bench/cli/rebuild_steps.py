@@ -85,12 +85,13 @@ LEARNERS = {  # By label: the flags of the method.
     "rlil-0.1": "rlil --dur 0.1",
     "rlil-0.3": "rlil --dur 0.3",
 }
+TENTH = {f"{method}-tenth": f"{method} --preset tenth" for method in ("rlpd", "dagger")}  # By label: their flags.
 SHOWN = {  # By label: the flags of the learners with recordings that ship, besides SOR and SIM.
     **{label: LEARNERS[label] for label in ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")},
-    "rlpd-tenth": "rlpd --preset tenth",
-    "dagger-tenth": "dagger --preset tenth",
+    **TENTH,
     "stopping": "stopping",
 }
+RANKED = (("real", SEEDS), ("synthetic", "0"))  # Sources that rank methods, and the seeds of learners there.
 UNDER_TRACKS = ("reflex", "rlil-0.1", "stopping")  # The rule, the paper's best method, and the one that leads.
 RULES = ("reflex", "nothing", "random")
 SIM = f"{WEIGHTS}/sim-0.1/minjerk/*"
@@ -124,13 +125,9 @@ STEPS: tuple[Step, ...] = (
     _quick("sor", "sor", "real", SEEDS, (SIM_QUICK,)),
     *(_quick(label, flags, "synthetic") for label, flags in LEARNERS.items()),
     _quick("sor", "sor", "synthetic", needs=(SIM_QUICK,)),
-    *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))),
+    *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in RANKED),
     _run("stopping-generated2000", "stopping --generated 2000", "real", SEEDS),
-    *(
-        _run(f"{method}-tenth", f"{method} --preset tenth", reaches, seeds)
-        for method in ("rlpd", "dagger")
-        for reaches, seeds in (("real", SEEDS), ("synthetic", "0"))
-    ),
+    *(_run(label, flags, reaches, seeds) for label, flags in TENTH.items() for reaches, seeds in RANKED),
     _run("dagger", "dagger", "real", SEEDS),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
     *(_run(label, flags, "real", SEEDS) for label, flags in LEARNERS.items()),
