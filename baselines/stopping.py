@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
-from baselines import generated_reaches, openings, pose_features, stopping_trainer
+from baselines import expert_windows, generated_reaches, openings, pose_features, stopping_trainer
 from baselines.normalise import CLIP
 from baselines.stopping_trainer import EDGE
 from dextron_bench import Perceptron, Setting, Track, Trainer
@@ -21,15 +21,15 @@ NEARBY = 5  # Chosen on `val` and on settings that are drawn like the rows of `h
 
 
 class BadNumber(ValueError):
-    """A negative number of settings."""
+    """A negative number of settings, or one that needs forks where there are none."""
 
 
 @dataclass(frozen=True)
 class Stopping:
     """Opens, closes when small networks say so, and never reopens; learns from closings that were tried in simulation.
 
-    Training needs a simulator that can be copied: every decision of a setting of `train` is tried. An agent sees the
-    states of its episode alone.
+    Training needs a simulator that can be copied, because every decision of a setting of `train` is tried, or the
+    windows of the experts alone (`--labels windows`). An agent sees the states of its episode alone.
     """
 
     name: ClassVar[str] = "stopping"
@@ -44,6 +44,9 @@ class Stopping:
     generated: int = 0
     """Number of settings on new reaches, from a model that is fitted to the reaches of `train`."""
 
+    labels: Literal["forks", "windows"] = "forks"
+    """When closing works: as tried in forks, or by the windows of the experts, which know only settings of `train`."""
+
     def __post_init__(self) -> None:
         if self.settings < 0:
             raise BadNumber(f"--settings is {self.settings}; give how many to learn from, or 0 for all")
@@ -51,13 +54,16 @@ class Stopping:
             raise BadNumber(f"--nearby is {self.nearby}; give how many to try near each setting, or 0 for none")
         if self.generated < 0:
             raise BadNumber(f"--generated is {self.generated}; give how many to try on new reaches, or 0 for none")
+        if self.labels == "windows" and (self.nearby != NEARBY or self.generated):
+            raise BadNumber("--labels windows knows only settings of `train`; leave out --nearby and --generated")
 
     @property
     def label(self) -> str:
         """The name, with the numbers of settings that are not the defaults."""
         limit = f"-{self.settings}" if self.settings else ""
         nearby = f"-nearby{self.nearby}" if self.nearby != NEARBY else ""
-        return self.name + limit + nearby + (f"-generated{self.generated}" if self.generated else "")
+        windows = "-windows" if self.labels == "windows" else ""
+        return self.name + windows + limit + nearby + (f"-generated{self.generated}" if self.generated else "")
 
     @property
     def epochs(self) -> int:
@@ -76,12 +82,21 @@ class Stopping:
 
     def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
         """A trainer with several networks per seed, all trained together."""
+        episodes = self._by_forks(track) if self.labels == "forks" else self._by_windows(track)
+        return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(episodes, track.device), seeds, track.device)
+
+    def _by_windows(self, track: Track) -> list[Episode]:
+        """The openings of settings, with labels from the windows of their experts."""
+        cases = list({case.setting: case for case in track.cases}.values())
+        return expert_windows.play(track, cases[: self.settings or len(cases)])
+
+    def _by_forks(self, track: Track) -> list[Episode]:
+        """The openings of settings, of settings near them and of generated ones, with labels that were tried."""
         settings = openings.settings_of(track)
         played = openings.load(track, settings)  # All of them, so that all numbers of settings share the files.
         near = self._nearby(track, settings, played)
         count = self.settings or len(settings)
-        episodes = [*played[:count], *chain.from_iterable(near[:count]), *self._generated(track, settings[:count])]
-        return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(episodes, track.device), seeds, track.device)
+        return [*played[:count], *chain.from_iterable(near[:count]), *self._generated(track, settings[:count])]
 
     def _nearby(self, track: Track, settings: Sequence[Setting], played: Sequence[Episode]) -> list[list[Episode]]:
         """For each setting (with its opening `played`) that the rule fails, openings near it that closing can solve."""
