@@ -127,6 +127,7 @@ STEPS: tuple[Step, ...] = (
     _quick("sor", "sor", "synthetic", needs=(SIM_QUICK,)),
     *(_run("stopping", "stopping", reaches, seeds) for reaches, seeds in RANKED),
     _run("stopping-generated2000", "stopping --generated 2000", "real", SEEDS),
+    _run("stopping-windows", "stopping --labels windows", "real", SEEDS),
     *(_run(label, flags, reaches, seeds) for label, flags in TENTH.items() for reaches, seeds in RANKED),
     _run("dagger", "dagger", "real", SEEDS),
     _run("sim-0.1", "sim", "minjerk", SEEDS),
