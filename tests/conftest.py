@@ -32,9 +32,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture(autouse=True)
-def no_old_progress(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A test begins as a new process would: no report of an earlier test is a minute old, which prints a line."""
-    monkeypatch.setattr(output._Lines, "printed", None)
+def no_old_progress() -> None:
+    """A test begins as a new process would: no report of an earlier test is a minute old, which prints a line.
+
+    Without `monkeypatch`: it would then be undone after the fixtures of a test whose patches the test replaces, and
+    so put those back.
+    """
+    output._Lines.printed = None
 
 
 @pytest.fixture(scope="session")
