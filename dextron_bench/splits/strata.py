@@ -10,8 +10,7 @@ import pandas as pd
 
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded import parsing
-from dextron_bench.splits.loading import Split, known_splits, load_split
-from dextron_bench.splits.tracks import PLUS
+from dextron_bench.splits.loading import Split, UnknownSplit, load_split
 from dextron_bench.storage import hashing
 from dextron_bench.world import task
 
@@ -47,9 +46,11 @@ def by_subject(split: Split, subject: str) -> tuple[Split, Split]:
 
 def shipped_strata(reaches: str, name: str, digest: str) -> pd.DataFrame | None:
     """The strata of a shipped split's rows; None if no split of that name and digest ships. Raises DamagedSplit."""
-    if name.partition(PLUS)[0] not in known_splits(reaches) or (split := load_split(reaches, name)).digest != digest:
+    try:
+        split = load_split(reaches, name)
+    except UnknownSplit:
         return None
-    return strata(split)
+    return strata(split) if split.digest == digest else None
 
 
 def start_regions(reaches: str, name: str, digest: str) -> np.ndarray | None:

@@ -52,9 +52,11 @@ def test_regions_are_numbered_by_ring_then_angle():
     assert numbers.tolist() == [4 * ring + angle for ring, angle in zip(rows["ring"], rows["angle"], strict=True)]
 
 
-@pytest.mark.parametrize(("name", "digest"), [("test", "0" * 64), ("nowhere", "0" * 64)])
-def test_a_split_that_does_not_ship_has_no_regions(name: str, digest: str):
-    assert start_regions("real", name, digest) is None
+@pytest.mark.parametrize(
+    ("reaches", "name"), [("real", "test"), ("real", "nowhere"), ("minjerk", "test+bottle-friction")]
+)
+def test_a_split_that_does_not_ship_has_no_regions(reaches: str, name: str):
+    assert start_regions(reaches, name, "0" * 64) is None
 
 
 def test_a_subject_is_separated_from_the_others_row_by_row():
