@@ -30,6 +30,7 @@ class UnwritableRecording(OSError):
 
     def __init__(self, file: Path, reason: object) -> None:
         super().__init__(f"cannot write recording {file}: {reason}")
+        self.reason = str(reason)
 
 
 def save(

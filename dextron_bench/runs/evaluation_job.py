@@ -16,6 +16,7 @@ from dextron_bench.evaluation import episode_table
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import recording_files, run_files
+from dextron_bench.runs.recorder import Recorder
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic, provenance, schemas, shares, tables
 from dextron_bench.storage.progress import Progress, no_progress
@@ -45,7 +46,8 @@ class EvaluationJob:
     `play` plays rows of a split and yields (row, episode) as episodes end. The first `record` rows of each split are
     recorded, with `about` among their properties. `facts` are what the result says of the run. `config` is what the
     episodes depend on besides split and rows, and `code` the hash of the code. With `rows_are_independent`, any rows
-    may be played together. With `one_platform`, pieces of different platforms do not fit together.
+    may be played together. With `one_platform`, pieces of different platforms do not fit together. At most `threads`
+    processes write recordings; 0 means one for each processor.
     """
 
     folder: RunFolder
@@ -59,6 +61,7 @@ class EvaluationJob:
     code: str
     rows_are_independent: bool = False
     one_platform: bool = False
+    threads: int = 0
 
     def pieces(self) -> list[RowPiece]:
         """All pieces, in order; they do not depend on what is done already."""
@@ -66,8 +69,7 @@ class EvaluationJob:
 
     def config_of(self, piece: RowPiece) -> dict[str, Any]:
         """What the files of a piece depend on."""
-        recorded = sum(row < self.record for row in piece.rows)
-        return {**self.config, "split": piece.split.digest, "recorded episodes": recorded}
+        return {**self.config, "split": piece.split.digest, "recorded episodes": self._recorded(piece.rows)}
 
     def done(self) -> set[str]:
         """Names of the pieces whose episodes are in the folder; raises the errors of `Work.read`, and DamagedFile."""
@@ -77,8 +79,8 @@ class EvaluationJob:
 
     def play_piece(self, piece: RowPiece, report: Progress = no_progress) -> list[Path]:
         """Plays a piece and writes its files; returns them, the stamp last. `report` receives episodes."""
-        rows, files = self._play_rows(piece.split, piece.rows, recording_files.write, report)
-        table = self._work.file(piece.name, ".parquet")
+        rows, recordings = self._play_rows(piece.split, piece.rows, report)
+        table, files = self._work.file(piece.name, ".parquet"), list(recordings)
         tables.write(table, pd.DataFrame(rows))
         return [*files, table, self._work.write(piece.name, self.config_of(piece), [table, *files])]
 
@@ -119,7 +121,9 @@ class EvaluationJob:
         """The rows of all episodes of a split, in order: from its pieces, and played where there are none."""
         parts = self._pieces_of(split)
         if not any(part.name in pieces for part in parts):
-            return self._play_rows(split, range(len(split.cases)), recording_files.record, report)[0]
+            rows, recordings = self._play_rows(split, range(len(split.cases)), report)
+            self._add_to_manifest(recordings)
+            return rows
         for part in parts:
             if part.name not in pieces:
                 self.play_piece(part, report)
@@ -133,23 +137,28 @@ class EvaluationJob:
             table = tables.read(file, tables.EPISODES)
         except tables.BadTable as error:
             raise atomic.DamagedFile(file, error) from error
-        if hashes := {place.name: sha256 for place, sha256 in piece.files.items() if place != file}:
-            recording_files.add_to_manifest(self.folder, hashes)
+        self._add_to_manifest({place: sha256 for place, sha256 in piece.files.items() if place != file})
         return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
 
-    def _play_rows(
-        self, split: Split, rows: range, record: Callable[..., object], report: Progress
-    ) -> tuple[list[dict[str, Any]], list[Path]]:
-        """Plays rows of a split; returns their rows of the table, in order, and the recordings that were written."""
+    def _recorded(self, rows: range) -> int:
+        return sum(row < self.record for row in rows)
+
+    def _add_to_manifest(self, recordings: Mapping[Path, str]) -> None:
+        if recordings:
+            recording_files.add_to_manifest(self.folder, {file.name: sha256 for file, sha256 in recordings.items()})
+
+    def _play_rows(self, split: Split, rows: range, report: Progress) -> tuple[list[dict[str, Any]], dict[Path, str]]:
+        """Plays rows of a split; returns their rows of the table, in order, and the SHA-256 of their recordings."""
         played: dict[int, dict[str, Any]] = {}
-        files = []
-        for row, episode in self.play(split, rows):
-            played[row] = episode_table.row(split, row, episode)
-            if row < self.record and len(episode.actions):
-                record(self.folder, self.source, split, row, episode, self.about)
-                files.append(self.folder.recording(split.name, row))
-            report(len(played), len(rows))
-        return [played[row] for row in sorted(played)], files
+        with Recorder(self.source, self._recorded(rows), self.threads) as recorder:
+            for row, episode in self.play(split, rows):
+                played[row] = episode_table.row(split, row, episode)
+                if row < self.record and len(episode.actions):
+                    about = recording_files.properties(split, row, self.about)
+                    recorder.write(self.folder.recording(split.name, row), split.cases[row], episode, about)
+                report(len(played), len(rows))
+            recordings = recorder.hashes()
+        return [played[row] for row in sorted(played)], recordings
 
     def _write_provenance(self, pieces: Mapping[str, shares.Piece], left: Sequence[Split]) -> None:
         """Replaces the run's provenance by the provenance of all that make it: pieces, earlier episodes, this process.

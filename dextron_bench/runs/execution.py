@@ -98,6 +98,7 @@ def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
         run.config() | {"weights": hashing.sha256(copy) if copy else None},
         provenance.code_hash(*registry.package_files(type(run.method))),
         getattr(player, "rows_are_independent", False) is True,
+        threads=threads,
     )
 
 

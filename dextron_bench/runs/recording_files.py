@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -30,23 +31,27 @@ def any_missing(folder: RunFolder, table: pd.DataFrame, record: int) -> bool:
 
 
 def record(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> None:
-    """Writes the recording of an episode as `write` does, and its hash in the manifest."""
+    """Writes the recording of an episode, and its hash in the manifest; `about` is as in `properties`."""
     file = folder.recording(split.name, row)
-    add_to_manifest(folder, {file.name: write(folder, source, split, row, episode, about)})
+    sha256 = write(source, file, split.cases[row], episode, properties(split, row, about))
+    add_to_manifest(folder, {file.name: sha256})
 
 
-def write(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> str:
-    """Writes the recording of an episode, with what the shipped success model predicts; returns its SHA-256.
+def properties(split: Split, row: int, about: dict[str, Any]) -> dict[str, Any]:
+    """The properties of the recording of a row; `about` names method, source of reaches and seed."""
+    return {**about, "split": split.name, "split_digest": split.digest, "row": row}
 
-    `about` names method, source of reaches and seed. The recording also says why the episode ended as it did.
+
+def write(source: Source, file: Path, case: Case, episode: Episode, about: dict[str, Any]) -> str:
+    """Writes the recording of an episode of a case, with properties `about`; returns its SHA-256.
+
+    It also has what the shipped success model predicts, and why the episode ended as it did. Raises
+    UnwritableRecording.
     """
     from dextron_bench import recording  # Loads Rerun, which evaluation alone does not need.
 
-    cause = diagnosis.diagnose(episode, split.cases[row]).cause
-    properties = {**about, "split": split.name, "split_digest": split.digest, "row": row, "cause": cause}
-    properties["physics"] = model.mjcf_hash()
-    file, path = folder.recording(split.name, row), source.path(episode.setting)
-    return recording.write(file, episode, path, properties, _predictions(source, split.cases[row], episode))
+    about = {**about, "cause": diagnosis.diagnose(episode, case).cause, "physics": model.mjcf_hash()}
+    return recording.write(file, episode, source.path(episode.setting), about, _predictions(source, case, episode))
 
 
 def add_to_manifest(folder: RunFolder, hashes: dict[str, str]) -> None:

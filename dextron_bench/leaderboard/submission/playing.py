@@ -66,8 +66,9 @@ def _prepare(
     def play(split: Split, rows: range) -> Played:
         return play_shuffled(entry.launch, source, split, folder.seed, limits, threads)
 
+    code = provenance.code_hash()
     return EvaluationJob(
-        folder, source, splits, play, record, about, about, config, provenance.code_hash(), one_platform=True
+        folder, source, splits, play, record, about, about, config, code, one_platform=True, threads=threads
     )
 
 
