@@ -31,7 +31,7 @@ class LostProcess(RuntimeError):
 
 
 class Recorder:
-    """Writes recordings of episodes of one source. It is a context, which ends its processes."""
+    """Writes recordings of episodes of one source. It is a context; an error in it leaves out those that wait."""
 
     def __init__(self, source: Source, count: int, threads: int = 0) -> None:
         """Expects about `count` recordings, and writes them in `threads` processes; 0 means one for each processor.
@@ -55,9 +55,9 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._threads.shutdown(cancel_futures=True)
         for process in self._processes:
             process.end()
-        self._threads.shutdown(cancel_futures=True)
 
     def write(self, file: Path, case: Case, episode: Episode, properties: dict[str, Any]) -> None:
         """Writes the recording of an episode, now or later, as `recording_files.write` does.
@@ -114,10 +114,13 @@ class _Process:
         return answer["sha256"]
 
     def end(self) -> None:
-        """Ends the process, which may have a recording to write: then a part of the file stays beside it."""
-        self._popen.kill()
+        """Lets the process end, and waits until it has."""
+        assert self._popen.stdin
+        assert self._popen.stdout
         with suppress(BrokenPipeError):
-            self._popen.communicate()
+            self._popen.stdin.close()
+        self._popen.stdout.close()
+        self._popen.wait()
 
     def _send(self, content: object) -> None:
         assert self._popen.stdin

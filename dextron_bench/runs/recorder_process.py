@@ -7,6 +7,7 @@ one recording after the other. It answers each with a line of JSON, and ends whe
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import sys
 
@@ -15,7 +16,7 @@ from dextron_bench.runs import recording_files
 
 
 def main() -> None:
-    """Writes recordings until the input ends, even in the middle of a pickle."""
+    """Writes recordings until the input ends or nobody reads the answers."""
     try:
         source = pickle.load(sys.stdin.buffer)
         while True:
@@ -24,8 +25,8 @@ def main() -> None:
                 answer = {"sha256": recording_files.write(source, *job)}
             except UnwritableRecording as error:
                 answer = {"error": error.reason}
-            print(json.dumps(answer), flush=True)
-    except (EOFError, pickle.UnpicklingError):
+            os.write(sys.stdout.fileno(), f"{json.dumps(answer)}\n".encode())
+    except (EOFError, pickle.UnpicklingError, BrokenPipeError):  # The other process has ended, perhaps by a signal.
         return
 
 
