@@ -15,6 +15,7 @@ import numpy as np
 
 MANTISSA = 53  # Bits that float64 holds exactly.
 BLOCK = 64  # Rows per block, so that the activations stay in the processor's cache.
+ALIKE = 408  # The same for rows that are alike, such as 8 curves of 51 actions.
 STEPS = 2**24  # `rounded` returns integer multiples of 1 / STEPS.
 SMALLEST = -400  # Numbers below two to this power count as 0, so that no unit over- or underflows.
 
@@ -29,15 +30,19 @@ class Perceptron:
             raise ValueError(f"layers of shapes {sizes} do not follow each other")
         self._layers = [(_IntegerMatrix(weight), np.asarray(bias, np.float64).reshape(-1)) for weight, bias in layers]
 
-    def __call__(self, x: np.ndarray) -> np.ndarray:
-        """Outputs (N, out), float64, for inputs (N, in)."""
-        return np.concatenate([self._forward(x[i : i + BLOCK]) for i in range(0, max(len(x), 1), BLOCK)])
+    def __call__(self, x: np.ndarray, alike: bool = False) -> np.ndarray:
+        """Outputs (N, out), float64, for inputs (N, in).
 
-    def _forward(self, x: np.ndarray) -> np.ndarray:
-        for weight, bias in self._layers[:-1]:
-            x = np.maximum(weight.product(x) + bias, 0.0)
-        weight, bias = self._layers[-1]
-        return weight.product(x) + bias
+        If rows that follow each other are `alike`, with zeros in the same columns, this is quicker by the zeros' share.
+        """
+        rows = ALIKE if alike else BLOCK
+        return np.concatenate([self._forward(x[i : i + rows], alike) for i in range(0, max(len(x), 1), rows)])
+
+    def _forward(self, x: np.ndarray, alike: bool) -> np.ndarray:
+        for layer, (weight, bias) in enumerate(self._layers):
+            x = np.maximum(x, 0.0) if layer else x
+            x = weight.product(x, alike) + bias
+        return x
 
 
 class _IntegerMatrix:
@@ -47,10 +52,13 @@ class _IntegerMatrix:
         self._bits = (MANTISSA - int(matrix.shape[0] - 1).bit_length()) // 2
         self._integers, self._units = to_integers(np.asarray(matrix, np.float64), self._bits, axis=0)
 
-    def product(self, x: np.ndarray) -> np.ndarray:
-        """The product (N, out) of rows (N, in) and the matrix."""
+    def product(self, x: np.ndarray, alike: bool = False) -> np.ndarray:
+        """The product (N, out) of rows (N, in) and the matrix; without columns that are 0 in all rows, if `alike`."""
+        matrix = self._integers
+        if alike and 0 < (used := x.any(axis=0)).sum() < len(matrix):
+            x, matrix = x[:, used], matrix[used]
         integers, units = to_integers(x, self._bits, axis=1)
-        return (integers @ self._integers) * (units * self._units) + 0.0  # Turns -0 into 0.
+        return (integers @ matrix) * (units * self._units) + 0.0  # Turns -0 into 0.
 
 
 def rounded(x: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -64,9 +64,9 @@ def write(
     chunks = [*_chunks(episode, properties), scene.planned_path(path), *scene.chunks(episode.states)]
     if predictions:
         last = len(episode.actions) - 1
-        chunks += [*success_plots.static_chunks(predictions.grid), *success_plots.chunks(predictions, episode.actions)]
+        chunks += success_plots.chunks(predictions, episode.actions)
         chunks += success_plots.ridge(predictions, episode.actions[:, 0], last, episode.success)
-    static, static_lines = _static_chunks()
+    static, static_lines = _static_chunks(tuple(predictions.grid.tolist()) if predictions else ())
     identity = digest([*static_lines, *lines(chunks)])
     chunks += [*static, Chunk.from_property("digest", rr.AnyValues(sha256=identity))]
     application = rrd_file.APPLICATION if predictions else rrd_file.PLAIN
@@ -99,10 +99,11 @@ def read(file: Path, sha256: str | None = None) -> Recording:
     return Recording(episode, _properties(content, "run"))
 
 
-@cache
-def _static_chunks() -> tuple[list[Chunk], list[str]]:
-    """Chunks that are equal in every recording, and their lines for the digest."""
+@lru_cache(maxsize=2)
+def _static_chunks(grid: tuple[float, ...]) -> tuple[list[Chunk], list[str]]:
+    """Chunks that are equal in all recordings with predictions at actions `grid`, or without; lines for the digest."""
     chunks = [*scene.static_chunks(), *blueprint.line_styles(), phase_lane.style()]
+    chunks += success_plots.static_chunks(np.array(grid)) if grid else []
     return chunks, list(lines(chunks))
 
 

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.methods.exact import Perceptron, rounded
+from dextron_bench.methods.exact import ALIKE, Perceptron, rounded
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 
 HIDDEN = 256
 SIZES = ((HIDDEN, model.STATE + 1), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (2, HIDDEN), (2,))  # Of weights and biases.
 GRID = np.linspace(-1.0, 1.0, 51)  # The actions of a curve (paper, Fig. 5).
+BLOCK = ALIKE // len(GRID)  # States whose curves are computed together, so that they stay in the processor's cache.
 CLIP = 10.0  # Scaled states are clipped to [-CLIP, CLIP].
 
 
@@ -49,15 +50,19 @@ class SuccessModel:
 
     def curve(self, states: np.ndarray) -> np.ndarray:
         """The chances (N, 51) of the actions of GRID in states (N, 48), bit-equal to the results of `chance`."""
-        hidden = self._hidden(states)[:, None] + GRID[:, None] * self._action_weights
-        return self._chances(hidden.reshape(-1, HIDDEN)).reshape(-1, len(GRID))
+        hidden, actions = self._hidden(states)[:, None], GRID[:, None] * self._action_weights
+        parts = [
+            self._chances((hidden[i : i + BLOCK] + actions).reshape(-1, HIDDEN), alike=True)
+            for i in range(0, max(len(hidden), 1), BLOCK)
+        ]
+        return np.concatenate(parts).reshape(-1, len(GRID))
 
     def _hidden(self, states: np.ndarray) -> np.ndarray:
         """The part (N, HIDDEN) of the first layer's output that depends on states (N, 48) only, not on an action."""
         return self._state_layer(np.clip((states - self._mean) / self._deviation, -CLIP, CLIP))
 
-    def _chances(self, hidden: np.ndarray) -> np.ndarray:
-        failure, success = self._upper_layers(np.maximum(hidden, 0.0)).T
+    def _chances(self, hidden: np.ndarray, alike: bool = False) -> np.ndarray:
+        failure, success = self._upper_layers(np.maximum(hidden, 0.0), alike).T
         odds = np.exp(np.clip(failure - success, -50.0, 50.0))
         return rounded(1.0 / (1.0 + odds))
 

@@ -15,6 +15,7 @@ from dextron_bench.evaluation import episode_table, episodes
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.runs import run_files
+from dextron_bench.runs.recorder import Recorder
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.success.network import SIZES, SuccessModel
@@ -22,7 +23,7 @@ from dextron_bench.success.predict import predict
 from tests.benchmarks.measure import Row, scaled, store_rows, time_in_turns, time_work
 from tests.benchmarks.workload import PreparedSource, draw_cases
 
-ROUNDS, EPISODES, FILES = 3, 32, 200
+ROUNDS, EPISODES, RECORDED, FILES = 3, 32, 500, 200
 
 
 def model() -> SuccessModel:
@@ -35,8 +36,8 @@ def model() -> SuccessModel:
 class Workbench:
     """Rolls episodes out and stores them in several ways."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.cases, self.model = folder, draw_cases(scaled(EPISODES)), model()
+    def __init__(self, folder: Path, count: int) -> None:
+        self.folder, self.cases, self.model = folder, draw_cases(count), model()
         self.source = PreparedSource(self.cases)
         self.episodes: dict[int, episodes.Episode] = {}
 
@@ -73,14 +74,14 @@ class Workbench:
     ],
 )
 def test_storing_compared_with_rollout(benchmark: BenchmarkFixture, tmp_path: Path, way: str, what: str):
-    workbench = Workbench(tmp_path)
+    workbench = Workbench(tmp_path, scaled(EPISODES))
     seconds, rolled = time_in_turns(benchmark, getattr(workbench, way), workbench.play, ROUNDS)
     rates = len(workbench.cases) / seconds, len(workbench.cases) / rolled
     store_rows(benchmark, Row(what, "episodes/s", rates[0], "episodes rolled out, all cores", rates[1]))
 
 
 def test_reading_scalars_back(benchmark: BenchmarkFixture, tmp_path: Path):
-    workbench = Workbench(tmp_path)
+    workbench = Workbench(tmp_path, scaled(EPISODES))
     workbench.play()
     workbench.record()
     files = [tmp_path / f"{number % len(workbench.cases)}.rrd" for number in range(scaled(FILES))]
@@ -92,6 +93,22 @@ def test_reading_scalars_back(benchmark: BenchmarkFixture, tmp_path: Path):
 
     seconds = time_work(benchmark, read, ROUNDS)
     store_rows(benchmark, Row("Rewards read back from recordings", "files/s", len(files) / seconds))
+
+
+def test_recording_beside_the_rollout(benchmark: BenchmarkFixture, tmp_path: Path):
+    workbench = Workbench(tmp_path, scaled(RECORDED))
+    cases, source = workbench.cases, workbench.source
+
+    def play_and_record() -> None:
+        with Recorder(source, len(cases)) as recorder:
+            for index, episode in rollout(ExpertAgent(), source, cases):
+                recorder.write(tmp_path / f"{index}.rrd", cases[index], episode, {"row": index})
+            assert len(recorder.hashes()) == len(cases)
+
+    seconds, rolled = time_in_turns(benchmark, play_and_record, workbench.play, 1)
+    rates = len(cases) / seconds, len(cases) / rolled
+    what = f"{len(cases)} episodes rolled out, and recorded with curves in a process beside for each core"
+    store_rows(benchmark, Row(what, "episodes/s", rates[0], "episodes rolled out, all cores", rates[1], aim=0.667))
 
 
 @pytest.mark.parametrize("count", [1, 16, 256])
