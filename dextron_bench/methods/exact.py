@@ -16,6 +16,7 @@ import numpy as np
 MANTISSA = 53  # Bits that float64 holds exactly.
 BLOCK = 64  # Rows per block, so that the activations stay in the processor's cache.
 ALIKE = 408  # The same for rows that are alike, such as 8 curves of 51 actions.
+WORTH = 0.9  # The share of columns below which a product without the others is quicker.
 STEPS = 2**24  # `rounded` returns integer multiples of 1 / STEPS.
 SMALLEST = -400  # Numbers below two to this power count as 0, so that no unit over- or underflows.
 
@@ -55,8 +56,10 @@ class _IntegerMatrix:
     def product(self, x: np.ndarray, alike: bool = False) -> np.ndarray:
         """The product (N, out) of rows (N, in) and the matrix; without columns that are 0 in all rows, if `alike`."""
         matrix = self._integers
-        if alike and 0 < (used := x.any(axis=0)).sum() < len(matrix):
-            x, matrix = x[:, used], matrix[used]
+        if alike and len(x) > len(matrix):  # Fewer rows would gain less than the copy of the matrix costs.
+            used = x.any(axis=0)
+            if 0.0 < used.mean() < WORTH:
+                x, matrix = x[:, used], matrix[used]
         integers, units = to_integers(x, self._bits, axis=1)
         return (integers @ matrix) * (units * self._units) + 0.0  # Turns -0 into 0.
 

@@ -35,7 +35,7 @@ def test_outputs_are_bit_equal_in_any_part_of_a_batch():
 @pytest.mark.parametrize("zeros", [0, 100, 256])
 def test_outputs_are_bit_equal_without_columns_of_zeros(zeros: int):
     rng = np.random.default_rng(4)
-    network, x = Perceptron(layers(rng, 256, 256, 2)), rng.normal(size=(ALIKE + 5, 256))
+    network, x = Perceptron(layers(rng, 256, 256, 2)), rng.normal(size=(2 * ALIKE + 5, 256))
     x[:ALIKE, :zeros] = 0.0
     assert network(x, alike=True).tobytes() == network(x).tobytes()
 
