@@ -23,7 +23,7 @@ from dextron_bench.storage.limited_process import SINGLE_THREADED
 
 FEW = 24  # Recordings that are written sooner than processes have started, which takes 2 s.
 AHEAD = 3  # Recordings for each process that are written or wait for it; with more, the rollout waits.
-COMMAND = (sys.executable, "-m", "dextron_bench.runs.recorder_process")
+COMMAND = (sys.executable, "-P", "-m", "dextron_bench.runs.recorder_process")  # -P: nothing of the working folder.
 
 
 class LostProcess(RuntimeError):
