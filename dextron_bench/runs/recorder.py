@@ -21,7 +21,7 @@ from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import recording_files
 from dextron_bench.storage.limited_process import SINGLE_THREADED
 
-FEW = 24  # Recordings that are written sooner than processes have started, which takes 2 s.
+EACH = 12  # Recordings for each process, at least: a process takes as long to start as to write them, some 2 s.
 AHEAD = 3  # Recordings for each process that are written or wait for it; with more, the rollout waits.
 COMMAND = (sys.executable, "-P", "-m", "dextron_bench.runs.recorder_process")  # -P: nothing of the working folder.
 
@@ -31,15 +31,15 @@ class LostProcess(RuntimeError):
 
 
 class Recorder:
-    """Writes recordings of episodes of one source. It is a context; an error in it leaves out those that wait."""
+    """A context manager that writes recordings of episodes of one source; after an error, those that wait are lost."""
 
     def __init__(self, source: Source, count: int, threads: int = 0) -> None:
-        """Expects about `count` recordings, and writes them in `threads` processes; 0 means one for each processor.
+        """Expects about `count` recordings. They are written in up to `threads` processes; 0 means one per processor.
 
         Few recordings are written in this process, and so are all with one thread.
         """
-        processes = min(threads or _processors(), count)
-        self._source, self._count = source, processes if count > FEW and processes > 1 else 0
+        processes = min(threads or _processors(), count // EACH)
+        self._source, self._count = source, processes if processes > 1 else 0
         self._processes: list[_Process] = []
         self._idle = queue.SimpleQueue[_Process]()
         self._threads = ThreadPoolExecutor(max(self._count, 1))  # Each waits for the answer of a process.

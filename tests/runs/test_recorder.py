@@ -33,7 +33,7 @@ EPISODES = [episode(k) for k in range(len(CASES))]
 @pytest.fixture
 def two(monkeypatch: pytest.MonkeyPatch) -> Iterator[Recorder]:
     """A recorder with two processes."""
-    monkeypatch.setattr(recorder, "FEW", 0)
+    monkeypatch.setattr(recorder, "EACH", 1)
     with Recorder(SOURCE, 2, threads=2) as started:
         assert len(started._processes) == 2
         yield started
@@ -52,7 +52,7 @@ def test_processes_write_what_this_process_writes(tmp_path: Path, two: Recorder,
     (tmp_path / "beside").mkdir()
     (tmp_path / "here").mkdir()
     beside = write_all(two, tmp_path / "beside")
-    with Recorder(SOURCE, recorder.FEW, threads=1) as alone:
+    with Recorder(SOURCE, len(CASES), threads=1) as alone:
         assert not alone._processes
         here = write_all(alone, tmp_path / "here")
     assert list(beside) == list(here) == ["0.rrd", "1.rrd", "2.rrd", "3.rrd"]
@@ -85,7 +85,7 @@ def test_a_process_that_was_killed_is_named(tmp_path: Path, two: Recorder):
 def test_an_error_of_the_rollout_ends_all_processes_after_what_they_write(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(recorder, "FEW", 0)
+    monkeypatch.setattr(recorder, "EACH", 1)
     two = Recorder(SOURCE, 2, threads=2)
 
     def stop() -> None:
@@ -112,7 +112,13 @@ def test_a_process_ends_silently_if_the_other_one_is_killed(tmp_path: Path, cut:
     assert (done.returncode, done.stderr, (tmp_path / "0.rrd").exists()) == (0, b"", cut < 0)
 
 
-def test_few_recordings_and_one_thread_start_no_process():
-    for count, threads in ((recorder.FEW, 8), (500, 1)):
-        with Recorder(SOURCE, count, threads) as alone:
-            assert not alone._processes
+@pytest.mark.parametrize(
+    ("count", "threads", "processes"), [(23, 8, 0), (24, 8, 2), (40, 8, 3), (500, 3, 3), (500, 1, 0), (0, 8, 0)]
+)
+def test_each_process_has_twelve_recordings_or_more(
+    monkeypatch: pytest.MonkeyPatch, count: int, threads: int, processes: int
+):
+    started = list[object]()
+    monkeypatch.setattr(recorder, "_Process", started.append)
+    Recorder(SOURCE, count, threads).__enter__()
+    assert started == [SOURCE] * processes
