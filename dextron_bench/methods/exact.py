@@ -15,7 +15,6 @@ import numpy as np
 
 MANTISSA = 53  # Bits that float64 holds exactly.
 BLOCK = 64  # Rows per block, so that the activations stay in the processor's cache.
-ALIKE = 408  # The same for rows that are alike, such as 8 curves of 51 actions.
 WORTH = 0.9  # The share of columns below which a product without the others is quicker.
 STEPS = 2**24  # `rounded` returns integer multiples of 1 / STEPS.
 SMALLEST = -400  # Numbers below two to this power count as 0, so that no unit over- or underflows.
@@ -34,9 +33,9 @@ class Perceptron:
     def __call__(self, x: np.ndarray, alike: bool = False) -> np.ndarray:
         """Outputs (N, out), float64, for inputs (N, in).
 
-        If rows that follow each other are `alike`, with zeros in the same columns, this is quicker by the zeros' share.
+        If some hundred rows are `alike`, with zeros in the same columns, this leaves out those columns.
         """
-        rows = ALIKE if alike else BLOCK
+        rows = max(len(x), 1) if alike else BLOCK
         return np.concatenate([self._forward(x[i : i + rows], alike) for i in range(0, max(len(x), 1), rows)])
 
     def _forward(self, x: np.ndarray, alike: bool) -> np.ndarray:

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.methods.exact import ALIKE, Perceptron, rounded
+from dextron_bench.methods.exact import Perceptron, rounded
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 
 HIDDEN = 256
 SIZES = ((HIDDEN, model.STATE + 1), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (2, HIDDEN), (2,))  # Of weights and biases.
 GRID = np.linspace(-1.0, 1.0, 51)  # The actions of a curve (paper, Fig. 5).
-BLOCK = ALIKE // len(GRID)  # States whose curves are computed together, so that they stay in the processor's cache.
+BLOCK = 8  # States whose curves are computed together: alike, if they follow each other, and few enough for the cache.
 CLIP = 10.0  # Scaled states are clipped to [-CLIP, CLIP].
 
 
