@@ -6,37 +6,47 @@ PYTHON ?= $(VENV)/bin/python
 METHOD ?= exp
 REACHES ?= synthetic
 ARGS ?=
-TORCH_INDEX ?=
 
-# On Linux, PyTorch's own index has a CPU build, which is smaller: make setup TORCH_INDEX=<its address>.
+# PyTorch's own index has a CPU build. PyPI's build for Linux needs gigabytes of CUDA, which only a GPU makes use of.
 TORCH ?= torch==2.13.0
+TORCH_INDEX ?= $(shell command -v nvidia-smi >/dev/null || echo https://download.pytorch.org/whl/cpu)
 
-# Tests render off screen: EGL where the system has it, OSMesa else.
-export MUJOCO_GL ?= $(shell ldconfig -p 2>/dev/null | grep -q libEGL.so.1 && echo egl || echo osmesa)
+INSTALL = $(VENV)/bin/python -m pip install -qq --disable-pip-version-check -c constraints.txt
 
 .PHONY: setup run test check bench docs
 .DEFAULT_GOAL := test
 
-READY = $(VENV)/.ready
-ifeq ($(PYTHON),$(VENV)/bin/python)
-ENVIRONMENT = $(READY)
+RUNTIME = $(VENV)/.runtime
+DEVELOPMENT = $(VENV)/.development
+ifneq ($(PYTHON),$(VENV)/bin/python)
+RUNTIME =
+DEVELOPMENT =
 endif
 
-setup: $(READY)
+setup: $(DEVELOPMENT)
 
-$(READY): pyproject.toml constraints.txt
-	$(BASE) -m venv $(VENV)
-	$(VENV)/bin/python -m pip install --quiet $(if $(TORCH_INDEX),--index-url $(TORCH_INDEX)) $(TORCH)
-	$(VENV)/bin/python -m pip install --quiet -c constraints.txt -e '.[dev]'
-	touch $@
+# What the benchmark itself needs. Where the requirement labmaze of dm-control has no wheel, dm-control comes without it.
+$(VENV)/.runtime: pyproject.toml constraints.txt
+	@echo "setting up $(VENV); the downloads are 0.6 GB, or several with PyTorch for a GPU"
+	@$(BASE) -m venv $(VENV)
+	@$(INSTALL) $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX) --retries 1) $(TORCH)
+	@$(INSTALL) -e .
+	@$(VENV)/bin/python -c 'import dm_control' 2>/dev/null || $(INSTALL) --no-deps dm-control dm-env dm-tree lxml wrapt
+	@touch $@
 
-run: $(ENVIRONMENT)
+# What tests, documentation and checks need beside it.
+$(VENV)/.development: $(VENV)/.runtime
+	@echo "adding what the tests need to $(VENV)"
+	@$(INSTALL) -e '.[dev]'
+	@touch $@
+
+run: $(RUNTIME)
 	$(PYTHON) -m dextron_bench run --method $(METHOD) --reaches $(REACHES) $(ARGS)
 
-test: $(ENVIRONMENT)
+test: $(DEVELOPMENT)
 	$(PYTHON) -m pytest -q -n 2 $(ARGS)
 
-check: $(ENVIRONMENT)
+check: $(DEVELOPMENT)
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m pyright --pythonpath $(PYTHON)
@@ -44,11 +54,11 @@ check: $(ENVIRONMENT)
 	$(MAKE) test
 	$(PYTHON) -m pytest -q -n 2 -m slow
 
-bench: $(ENVIRONMENT)
+bench: $(DEVELOPMENT)
 	mkdir -p .benchmarks
 	$(PYTHON) -m pytest -q -o addopts= tests/benchmarks --benchmark-json=.benchmarks/bench.json $(ARGS)
 	$(PYTHON) tests/benchmarks/table.py .benchmarks/bench.json docs/benchmarks.md
 
 # The documentation site, in site/. To read it: python3 -m http.server -d site
-docs: $(ENVIRONMENT)
+docs: $(DEVELOPMENT)
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict

@@ -36,6 +36,8 @@ LEVELS = {
 SDKS = {  # Packages of others that one place alone imports.
     "rerun": "dextron_bench/recording/",
     "rerun_bindings": "dextron_bench/recording/",
+    "mujoco": "dextron_bench/world/simulator.py",
+    "dm_control": "dextron_bench/world/suite.py",
     "matplotlib": "dextron_bench/scores/figures/",
     "minari": "dextron_bench/evaluation/minari_export.py",
     "av": "dextron_bench/recording/film.py",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import mujoco
 import numpy as np
 import rerun as rr
 from rerun.chunk import Chunk
@@ -12,6 +11,7 @@ from rerun.chunk import Chunk
 from dextron_bench.reaches import reach
 from dextron_bench.recording import shapes
 from dextron_bench.world import model, task
+from dextron_bench.world.simulator import mujoco
 
 TRACE = "/world/trace"  # One segment for each step; the layout shows those up to the cursor.
 CONTACTS = "/world/contacts"

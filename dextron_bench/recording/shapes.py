@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-import mujoco
 import numpy as np
 import rerun as rr
 
 from dextron_bench.reaches import rotation
 from dextron_bench.world.rendering import visuals
+from dextron_bench.world.simulator import mujoco
 
 XYZW = [1, 2, 3, 0]  # Rerun puts the scalar part of a quaternion last.
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from mujoco.batch import Batch
 
 from dextron_bench.world import model
 from dextron_bench.world.bottle import Bottle
+from dextron_bench.world.simulator import Batch
 
 FIELDS = ("body_mass", "body_inertia", "geom_friction", "geom_size", "geom_rbound", "geom_aabb", "bvh_aabb")
 

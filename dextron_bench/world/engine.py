@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
 from dextron_bench.reaches.reach import PALM_AHEAD, Path
 from dextron_bench.world import model, task
 from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.bottles import Bottles, model_bottle
+from dextron_bench.world.simulator import Batch, mujoco
 
 STATE_BOUND = 1e10  # Above this, MuJoCo declares a simulation unstable.
 DIVERGED = "the simulation diverged"  # The failure of such an episode.

@@ -6,10 +6,10 @@ import hashlib
 from functools import cache
 from importlib.resources import files
 
-import mujoco
 import numpy as np
 
 from dextron_bench.reaches.timing import CONTROL_STEP
+from dextron_bench.world.simulator import mujoco
 
 DIGITS = ("thumb", "index", "middle", "ring", "little")
 STATE = 48  # qpos (25), then qvel (23).

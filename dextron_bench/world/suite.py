@@ -5,18 +5,40 @@ from __future__ import annotations
 import copy
 from collections import OrderedDict
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from dm_control.mujoco import engine as dm_mujoco
-from dm_control.mujoco import wrapper
-from dm_control.rl import control
-from dm_env import specs
 
 from dextron_bench.reaches.reach import PALM_AHEAD, Path
 from dextron_bench.reaches.setting import Setting, Source
-from dextron_bench.world import model, task
+from dextron_bench.world import model, simulator, task
 from dextron_bench.world.engine import DIVERGED, STATE_BOUND, UNSTABLE
 from dextron_bench.world.environment import SettingQueue, validated_action
+
+ADDITION = "dm-control dm-env dm-tree lxml"  # Packages that `import dm_control` wants beside those of the benchmark.
+
+
+class MissingDmControl(ImportError):
+    """dm_control is not installed; the message says how to add it."""
+
+    def __init__(self, name: str | None) -> None:
+        super().__init__(
+            f"the dm_control environment needs {name or 'dm_control'}: pip install --no-deps {ADDITION} "
+            "(--no-deps: labmaze, which dm-control asks for and nothing here uses, has no wheel for this Python)"
+        )
+
+
+if TYPE_CHECKING:
+    from dm_control.mujoco import engine as dm_mujoco
+    from dm_control.mujoco import wrapper
+    from dm_control.rl import control
+    from dm_env import specs
+else:
+    try:
+        dm_mujoco, wrapper = simulator.load("dm_control.mujoco.engine"), simulator.load("dm_control.mujoco.wrapper")
+        control, specs = simulator.load("dm_control.rl.control"), simulator.load("dm_env.specs")
+    except ModuleNotFoundError as error:
+        raise MissingDmControl(error.name) from error
 
 
 def load(

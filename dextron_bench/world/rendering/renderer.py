@@ -10,10 +10,10 @@ from importlib import import_module
 from types import TracebackType
 from typing import Protocol, Self
 
-import mujoco
 import numpy as np
 
 from dextron_bench.world.rendering import visuals
+from dextron_bench.world.simulator import mujoco
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # The library of each off-screen backend, best first.
 INSTALL = (

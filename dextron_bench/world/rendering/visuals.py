@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from functools import cache
 
-import mujoco
 import numpy as np
 
 from dextron_bench.reaches import rotation
 from dextron_bench.world import model
 from dextron_bench.world.rendering.meshes import Mesh, Section, loft
+from dextron_bench.world.simulator import mujoco
 
 COLOURS = {  # RGB, specular and shininess of each material.
     "shell": ((0.90, 0.90, 0.88), 0.45, 0.6),
