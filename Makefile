@@ -12,6 +12,8 @@ TORCH ?= torch==2.13.0
 TORCH_INDEX ?= $(shell command -v nvidia-smi >/dev/null || echo https://download.pytorch.org/whl/cpu)
 
 INSTALL = $(VENV)/bin/python -m pip install -qq --disable-pip-version-check -c constraints.txt
+TORCH_ALONE = $(INSTALL) --no-deps $(TORCH)
+DM_CONTROL = dm-control dm-env dm-tree lxml wrapt
 
 .PHONY: setup run test check bench docs
 .DEFAULT_GOAL := test
@@ -25,19 +27,20 @@ endif
 
 setup: $(DEVELOPMENT)
 
-# What the benchmark itself needs. Where the requirement labmaze of dm-control has no wheel, dm-control comes without it.
+# What the benchmark itself needs. Without an answer from PyTorch's index, PyTorch comes from PyPI.
 $(VENV)/.runtime: pyproject.toml constraints.txt
 	@echo "setting up $(VENV); the downloads are 0.6 GB, or several with PyTorch for a GPU"
 	@$(BASE) -m venv $(VENV)
-	@$(INSTALL) $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX) --retries 1) $(TORCH)
+	@$(if $(TORCH_INDEX),$(TORCH_ALONE) --retries 0 --extra-index-url $(TORCH_INDEX) 2>/dev/null ||) $(TORCH_ALONE)
 	@$(INSTALL) -e .
-	@$(VENV)/bin/python -c 'import dm_control' 2>/dev/null || $(INSTALL) --no-deps dm-control dm-env dm-tree lxml wrapt
 	@touch $@
 
-# What tests, documentation and checks need beside it.
+# What tests, documentation and checks need beside it. dm-control comes without its requirement labmaze where that has no
+# wheel; it comes last, since pip complains about labmaze whenever it installs something later.
 $(VENV)/.development: $(VENV)/.runtime
 	@echo "adding what the tests need to $(VENV)"
 	@$(INSTALL) -e '.[dev]'
+	@$(VENV)/bin/python -c 'import dm_control' 2>/dev/null || $(INSTALL) --no-deps $(DM_CONTROL)
 	@touch $@
 
 run: $(RUNTIME)

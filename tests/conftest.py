@@ -112,7 +112,7 @@ def played_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with runs/ of the tiny world: `exp` solves both rows of `test`, recorded; `nothing` solves none."""
     with tiny_benchmark.working_folder(tmp_path_factory.mktemp("played")) as folder:
         for words in (["exp", "--record", "2"], ["nothing", "--record", "0"]):
-            assert main.main(["run", "--method", *words, "--split", "test", "--no-floors", "--quiet", "--json"]) == 0
+            assert main.main(["run", "--method", *words, "--split", "test", "--quiet", "--json"]) == 0
     return folder
 
 

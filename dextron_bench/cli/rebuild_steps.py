@@ -59,7 +59,7 @@ def _bottles(reaches: str) -> Step:
 
 def _run(label: str, method: str, reaches: str, seeds: str = "0", needs: tuple[str, ...] = ()) -> Step:
     """A run of a method on all splits that rank methods, with its training."""
-    command = f"run --method {method} --reaches {reaches} --seed {seeds} --no-floors --runs {{runs}}"
+    command = f"run --method {method} --reaches {reaches} --seed {seeds} --runs {{runs}}"
     name = f"{label}/{reaches}"
     return Step(name, (command,), (f"{DATA}/splits-{reaches}.parquet", *needs), publishes=(name,))
 
@@ -74,7 +74,7 @@ def _experts(reaches: str, subjects: str = "") -> Step:
     splits = f"val test unseen-reach {subjects} hard open"
     return replace(
         _run("exp", "exp", reaches),
-        commands=(f"run --method exp --reaches {reaches} --split {splits} --no-floors --runs {{runs}}",),
+        commands=(f"run --method exp --reaches {reaches} --split {splits} --runs {{runs}}",),
     )
 
 
@@ -142,7 +142,7 @@ STEPS: tuple[Step, ...] = (
     Step(
         "recordings",
         (
-            "run --method exp --split test --no-floors --runs {runs}/show",
+            "run --method exp --split test --runs {runs}/show",
             *map(_show, (*SHOWN.values(), "sor")),
             _show("sim", "minjerk"),
             "recordings choose --runs {runs}/show --into recordings",

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """Run a method and the floors on the splits of a source of reaches, and print them beside the published rows.
+    """Run a method on the splits of a source of reaches, and print it beside the published rows.
 
     A method that learns is trained first, with all seeds together. The settings of a method are flags too:
     `dextron-bench run --method rlil --help` shows them. Nothing that a run folder already holds is computed again:
@@ -48,8 +48,6 @@ class Run:
     """Seeds of the agent."""
     record: int = 1
     """How many episodes of each split to record, from the first."""
-    floors: bool = True
-    """Also evaluate the two floors for comparison: an agent that does nothing and a random one."""
     tracker: tuple[TrackerName, ...] = ()
     """Show the training in these trackers while it runs (docs/following.md)."""
     live: bool = False
@@ -120,9 +118,6 @@ class Run:
         methods = registry.paper_methods(**settings) if self.all else [(self.method, settings)]
         plans = [Plan(spec, self.reaches, self.split, 0, self.record, flags) for spec, flags in methods]
         runs = [beside_other_code(resolve(plan), self.runs) for plan in plans]
-        reaches = self.reaches if self.all else runs[0].source
-        floors = [name for name in registry.FLOORS if self.floors and name != self.method]
-        runs += [resolve(Plan(name, reaches, self.split)) for name in floors]
         runs = [with_tracks(run, self.track) for run in runs]
         return [[run.with_seed(seed) for seed in dict.fromkeys(self.seed)] for run in runs]
 
@@ -163,11 +158,9 @@ class Run:
 
     def _following(self, group: list[plans.Run]) -> AbstractContextManager[None]:
         """Trackers follow the trainings of a group, in processes of their own."""
-        from dextron_bench.methods import registry
-
         names = [*dict.fromkeys(self.tracker), *(["live"] if self.live else [])]
         job = group[0].training_job(self.runs)
-        if names and job is None and group[0].label not in registry.FLOORS:
+        if names and job is None:
             print_warning(f"{group[0].label} does not train, so there is nothing to follow")
         if not names or job is None:
             return nullcontext()

@@ -75,6 +75,8 @@ def _import(spec: str, load: Callable[[], Any]) -> Any:
         return load()
     except UnknownMethod:
         raise
+    except ModuleNotFoundError as error:
+        raise UnknownMethod(f"method {spec!r} needs the Python module {error.name}, which is not installed") from error
     except (Exception, SystemExit) as error:
         raise UnknownMethod(f"method {spec!r} cannot be imported: {type(error).__name__}: {error}") from error
 

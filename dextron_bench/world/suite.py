@@ -15,7 +15,9 @@ from dextron_bench.world import model, simulator, task
 from dextron_bench.world.engine import DIVERGED, STATE_BOUND, UNSTABLE
 from dextron_bench.world.environment import SettingQueue, validated_action
 
-ADDITION = "dm-control dm-env dm-tree lxml"  # Packages that `import dm_control` wants beside those of the benchmark.
+ADDITION = (
+    "dm-control dm-env dm-tree lxml wrapt"  # Packages that `import dm_control` wants beside those of the benchmark.
+)
 
 
 class MissingDmControl(ImportError):

@@ -171,7 +171,7 @@ def test_threads(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
 
 def test_busy_machine(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     """A training beside other processes gets a share of the processors; more threads would wait for each other."""
-    words = ["run", "--method", "rlil", "--preset", "smoke", "--split", "val", "--no-floors", "--quiet"]
+    words = ["run", "--method", "rlil", "--preset", "smoke", "--split", "val", "--quiet"]
     environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
 
     def train(name: str) -> None:

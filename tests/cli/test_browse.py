@@ -12,7 +12,7 @@ from dextron_bench import recording
 from dextron_bench.cli import browse, main
 from dextron_bench.leaderboard.local_server import LocalServer
 
-WORDS = ["--split", "test", "--no-floors", "--quiet", "--json", "--record", "0"]
+WORDS = ["--split", "test", "--quiet", "--json", "--record", "0"]
 
 
 @pytest.fixture

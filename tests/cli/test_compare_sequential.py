@@ -55,7 +55,7 @@ def test_a_finished_run_is_compared_without_playing_it(here: Path, capsys: pytes
 
 def test_a_finished_run_of_an_agent_in_a_file_is_not_played_again(here: Path, capsys: pytest.CaptureFixture[str]):
     agent = constant_agent(here, "-1.0")
-    assert main.main(["run", "--method", agent, "--split", "test", "--quiet", "--threads", "1", "--no-floors"]) == 0
+    assert main.main(["run", "--method", agent, "--split", "test", "--quiet", "--threads", "1"]) == 0
     assert compared(capsys, agent, "exp")["a"]["stored"]
     with (here / "constant.py").open("a") as file:
         file.write("# Other code.\n")

@@ -21,7 +21,7 @@ from dextron_bench.storage.atomic import DamagedFile
 from tests.helpers import tiny_benchmark, tiny_training
 from tests.helpers.short_reaches import SOURCE
 
-TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--no-floors", "--record", "0"]
+TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--record", "0"]
 SHOW, BUILD = ["leaderboard", "show"], ["leaderboard", "build", "--runs", "runs", "--into", "board"]
 RUN, AGAIN = ["run", *TOY], ["run", *TOY, "--split", "val"]
 SEED = "runs/toy-0.1/synthetic/seed0"
@@ -153,7 +153,7 @@ def test_weights_with_a_flipped_bit_are_neither_used_nor_published(here: Path, c
 
 @pytest.mark.parametrize("name", ["episodes.parquet", "result.json", "config.json"])
 def test_a_damaged_run_is_one_line_with_the_file(tiny_world: Path, complaint: Callable[..., str], name: str):
-    words = ["run", "--method", "nothing", "--split", "open", "--no-floors", "--quiet"]
+    words = ["run", "--method", "nothing", "--split", "open", "--quiet"]
     assert main.main(words) == 0
     file = tiny_world / "runs" / "nothing" / "synthetic" / "seed0" / name
     file.write_bytes(file.read_bytes()[:20])

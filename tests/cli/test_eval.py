@@ -25,7 +25,7 @@ def here(training_world: Path) -> Path:
 
 
 def train(spec: str, *words: str) -> list[str]:
-    common = ["--quiet", "--no-floors", "--record", "0", "--split", "test", "--preset", "smoke"]
+    common = ["--quiet", "--record", "0", "--split", "test", "--preset", "smoke"]
     return ["run", "--method", spec, *common, *words]
 
 

@@ -44,7 +44,7 @@ def mine(folder: Path, spoil: str) -> str:
 
 
 def run(method: str, *words: str) -> list[str]:
-    return ["run", "--method", method, "--split", "test", "--no-floors", "--quiet", "--record", "0", *words]
+    return ["run", "--method", method, "--split", "test", "--quiet", "--record", "0", *words]
 
 
 def test_an_agent_that_fails_in_some_episodes_is_code_3_and_other_episodes_count(

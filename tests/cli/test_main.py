@@ -27,7 +27,7 @@ def here(tiny_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(method: str, *words: str) -> list[str]:
-    return ["run", "--method", method, "--split", "test", "--no-floors", "--quiet", "--record", "0", *words]
+    return ["run", "--method", method, "--split", "test", "--quiet", "--record", "0", *words]
 
 
 def test_stdout_holds_json_and_nothing_else(here: Path, capsys: pytest.CaptureFixture[str]):

@@ -35,7 +35,7 @@ from tests.helpers.toy_learner import ToyTrainer
 COUNT, THOROUGH = 20, 300  # Mutations of each kind of file.
 LONGEST = 30  # [s] that a command may take.
 MOST_MEMORY = 2**30  # Bytes; the memory of this process, and of all that it starts, may grow by so much.
-TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--no-floors", "--record", "0"]
+TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--record", "0"]
 RUN = ["run", *TOY]
 BUILD = ["leaderboard", "build", "--runs", "runs", "--into", "board"]
 BASE = "runs/toy-0.1/synthetic"
@@ -65,7 +65,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path
         Path("near.py").write_text(AGENT)
         assert main.main(["submit", "near.py:Near", "--name", "near", "--seed", "0", "--quiet"]) == 0
         patch.chdir(made["recording"])
-        assert main.main(["run", "--method", "nothing", "--no-floors", "--quiet", "--record", "1"]) == 0
+        assert main.main(["run", "--method", "nothing", "--quiet", "--record", "1"]) == 0
         yield made
     tiny_benchmark.forget()
 

@@ -44,7 +44,7 @@ def test_recordings_are_listed_with_their_properties(here: Path, capsys: pytest.
 def test_recordings_are_selected_in_the_words_of_view(
     here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
 ):
-    nothing = ["run", "--method", "nothing", "--split", "test", "--no-floors", "--quiet", "--json", "--record", "2"]
+    nothing = ["run", "--method", "nothing", "--split", "test", "--quiet", "--json", "--record", "2"]
     assert main.main(nothing) == 0
 
     def listed(*words: str) -> list[tuple[str, int, str]]:

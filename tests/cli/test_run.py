@@ -18,7 +18,7 @@ from dextron_bench.storage import hashing, tensors
 from tests.helpers import tiny_training
 from tests.helpers.tiny_training import MINJERK_TOY, TOY, TRANSFER
 
-FAST = ("--quiet", "--no-floors", "--record", "0")
+FAST = ("--quiet", "--record", "0")
 
 
 @pytest.fixture
@@ -65,10 +65,8 @@ def test_a_policy_transfer_acts_with_the_weights_of_its_source_policy(
     transfer = here / "runs" / "toy-transfer" / "synthetic" / "seed0"
     assert (source_policy / "weights.safetensors").read_bytes() == (transfer / "weights.safetensors").read_bytes()
     assert json.loads((transfer / "result.json").read_text())["training"]["label"] == "minjerk-toy-0.1"
-    table = printed_json(*run(MINJERK_TOY), "--floors")
-    assert {row["method"]: row["reaches"] for row in table} == dict.fromkeys(
-        ("minjerk-toy-0.1", "nothing", "random"), "minjerk"
-    )
+    (row,) = printed_json(*run(MINJERK_TOY))
+    assert (row["method"], row["reaches"]) == ("minjerk-toy-0.1", "minjerk")
     arrays = tensors.read(source_policy / "weights.safetensors")
     tensors.write(source_policy / "weights.safetensors", arrays, {"label": "minjerk-toy-0.1", "seed": 1})
     assert main.main(run(TRANSFER)) == 2
@@ -163,11 +161,11 @@ def test_published_rows_of_the_same_splits_and_physics_stand_beside_the_new_ones
     def origins() -> dict[str, str]:
         """Where each row of the table that a run of NOTHING prints comes from, by method."""
         capsys.readouterr()
-        assert main.main(["run", "--method", "nothing", "--no-floors", "--record", "0", "--split", "test"]) == 0
+        assert main.main(["run", "--method", "nothing", "--record", "0", "--split", "test"]) == 0
         cells = [[cell.strip() for cell in line.split("│")] for line in capsys.readouterr().out.splitlines()]
         return {line[2]: line[-2] for line in cells if len(line) > 4}
 
-    assert main.main(["run", "--method", "exp", "--no-floors", "--record", "0", "--runs", "board"]) == 0
+    assert main.main(["run", "--method", "exp", "--record", "0", "--runs", "board"]) == 0
     monkeypatch.setattr(result_files, "published_results", lambda: here / "board")
     assert origins() == {"exp": "published", "nothing": "this run"}
     file = here / "board/exp/synthetic/seed0/result.json"
@@ -188,7 +186,7 @@ def test_every_configuration_has_a_folder_and_a_row(
     def labels(*flags: str) -> list[str]:
         for name in [name for name in sys.modules if name.startswith(loading.PREFIX)]:
             monkeypatch.delitem(sys.modules, name)  # A new process would load the file again.
-        words = ["run", "--method", "odd.py:Odd", *flags, "--no-floors", "--record", "0", "--split", "test", "--quiet"]
+        words = ["run", "--method", "odd.py:Odd", *flags, "--record", "0", "--split", "test", "--quiet"]
         return [row["method"] for row in printed_json(*words)]
 
     (here / "odd.py").write_text(text)

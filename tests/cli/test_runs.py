@@ -34,7 +34,7 @@ def here(tiny_world: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     """A folder with runs of EXP, of an agent with two settings, and of an agent that failed, in the tiny world."""
     (tiny_world / "mine.py").write_text(AGENT.format(name="mine", broken=False))
     (tiny_world / "broken.py").write_text(AGENT.format(name="broken", broken=True))
-    common = ["--split", "test", "--no-floors", "--quiet", "--record", "0"]
+    common = ["--split", "test", "--quiet", "--record", "0"]
     for words, code in (
         (["exp"], 0),
         (["mine.py:Mine"], 0),

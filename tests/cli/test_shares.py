@@ -58,21 +58,25 @@ def play_shares(words: tuple[str, ...], of: int, into: Path) -> None:
     put_together(parts, into)
 
 
-def test_the_bytes_are_the_same_for_any_number_of_shares(here: Path, capsys: pytest.CaptureFixture[str]):
+@pytest.mark.parametrize(("method", "pieces"), [("exp", 3), ("nothing", 3), ("random", 2)])
+def test_the_bytes_are_the_same_for_any_number_of_shares(
+    here: Path, capsys: pytest.CaptureFixture[str], method: str, pieces: int
+):
     """EXP and `nothing` are cut into rows; `random` draws for all rows of a split together, so it is not."""
-    play(RUN, "--runs", here / "whole")
+    words = tuple(method if word == "exp" else word for word in RUN)
+    play(words, "--runs", here / "whole")
     unshared, files = capsys.readouterr().out, contents(here / "whole")
-    assert len([name for name in files if name.endswith("episodes.parquet")]) == 3
+    assert f"{method}/synthetic/seed0/episodes.parquet" in files
     for of in (1, 2, 3):
         merged = here / f"of{of}"
-        play_shares(RUN, of, merged)
-        assert "of 8 pieces are done, in" in capsys.readouterr().out
-        play(RUN, "--merge", "--runs", merged)
+        play_shares(words, of, merged)
+        assert f"of {pieces} pieces are done, in" in capsys.readouterr().out
+        play(words, "--merge", "--runs", merged)
         assert capsys.readouterr().out == unshared.replace("whole", merged.name)
         assert contents(merged) == files
-        recordings = sorted(path.name for path in (merged / "exp/synthetic/seed0/recordings").iterdir())
+        recordings = sorted(path.name for path in (merged / method / "synthetic/seed0/recordings").iterdir())
         assert recordings == ["test-0000.rrd", "unseen-reach-0000.rrd"]
-        assert sorted(json.loads((merged / "exp/synthetic/seed0/recordings.json").read_text())) == recordings
+        assert sorted(json.loads((merged / method / "synthetic/seed0/recordings.json").read_text())) == recordings
 
 
 def test_a_merge_plays_nothing_and_may_be_repeated(here: Path, monkeypatch: pytest.MonkeyPatch):
@@ -86,7 +90,7 @@ def test_a_merge_plays_nothing_and_may_be_repeated(here: Path, monkeypatch: pyte
 
 
 def test_the_command_without_a_share_plays_only_what_is_missing(here: Path, monkeypatch: pytest.MonkeyPatch):
-    words = (*RUN, "--no-floors")
+    words = RUN
     play(words, "--runs", here / "whole")
     play(words, "--share", "1/2")
     played, rollout = [], execution.rollout
@@ -99,7 +103,7 @@ def test_the_command_without_a_share_plays_only_what_is_missing(here: Path, monk
 
 
 def test_pieces_of_two_machines_give_the_same_scores_and_name_both(here: Path, monkeypatch: pytest.MonkeyPatch):
-    words = (*RUN, "--no-floors", "--record", "0")
+    words = (*RUN, "--record", "0")
     play(words, "--runs", here / "whole")
     for index, machine in enumerate(("small", "large")):
         on_machine(machine, monkeypatch)
@@ -123,10 +127,10 @@ def test_pieces_of_two_machines_give_the_same_scores_and_name_both(here: Path, m
 
 
 def test_a_merge_of_nothing_or_of_some_pieces_names_what_is_missing(here: Path, complaint: Callable[..., str]):
-    text = complaint(*RUN, "--no-floors", "--merge")
+    text = complaint(*RUN, "--merge")
     assert "the merge lacks 3 of 3 pieces: exp/synthetic/seed0/test-0000-0000, exp/synthetic/seed0/test-0001" in text
-    play((*RUN, "--no-floors"), "--share", "0/2")
-    text = complaint(*RUN, "--no-floors", "--merge")
+    play(RUN, "--share", "0/2")
+    text = complaint(*RUN, "--merge")
     assert "lacks 1 of 3 pieces: exp/synthetic/seed0/test-0001-0001; run the shares that have them" in text
     assert not (here / "runs/exp/synthetic/seed0/episodes.parquet").exists()
 
@@ -136,7 +140,7 @@ def edited(file: Path, **entries: Any) -> None:
 
 
 def test_doubled_foreign_and_damaged_pieces_are_named(here: Path, complaint: Callable[..., str]):
-    words = (*RUN, "--no-floors", "--record", "0")
+    words = (*RUN, "--record", "0")
     for command in (("--merge",), (), ("--share", "0/2")):
         shutil.rmtree(here / "runs", ignore_errors=True)
         play(words, "--share", "0/1")
@@ -163,7 +167,7 @@ def test_doubled_foreign_and_damaged_pieces_are_named(here: Path, complaint: Cal
 
 
 def test_a_share_that_was_killed_leaves_no_half_piece(here: Path, monkeypatch: pytest.MonkeyPatch):
-    words = (*RUN, "--no-floors", "--record", "0")
+    words = (*RUN, "--record", "0")
     play(words, "--runs", here / "whole")
 
     def killed(*_: object, **__: object) -> None:
@@ -180,7 +184,7 @@ def test_a_share_that_was_killed_leaves_no_half_piece(here: Path, monkeypatch: p
 
 def test_pieces_of_an_agent_that_was_edited_do_not_fit(here: Path, complaint: Callable[..., str]):
     """The label of the edited agent is another one, so its merge finds no pieces at all."""
-    words = ("run", "--method", constant_agent(here, "0.1"), "--no-floors", "--quiet", "--record", "0")
+    words = ("run", "--method", constant_agent(here, "0.1"), "--quiet", "--record", "0")
     play(words, "--share", "0/1")
     assert sorted(file.stem for file in here.glob("runs/constant/*/*/pieces/*.json")) == [
         "test-0000-0001",
@@ -200,7 +204,7 @@ def test_a_share_and_a_merge_at_once_are_refused(here: Path, complaint: Callable
 
 def test_a_share_trains_nothing(here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]):
     tiny_training.install(tiny_training.write(here / "data"), monkeypatch.setattr)
-    words = ("run", "--method", TOY, "--preset", "smoke", "--quiet", "--no-floors", "--record", "0", "--split", "test")
+    words = ("run", "--method", TOY, "--preset", "smoke", "--quiet", "--record", "0", "--split", "test")
     assert "toy-0.1 is not trained for seed 0" in complaint(*words, "--share", "0/2")
     play(words, "--runs", here / "whole")
     play((*words[:-1], "val"), "--runs", here / "runs")
@@ -221,7 +225,8 @@ def test_a_share_trains_nothing(here: Path, monkeypatch: pytest.MonkeyPatch, com
 
 
 def test_shares_verify_a_board_as_one_process_does(here: Path, capsys: pytest.CaptureFixture[str]):
-    play(RUN, "--record", "0")
+    for method in ("exp", "nothing"):
+        play(("run", "--method", method, "--quiet", "--record", "0"))
     assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
     result = here / "board/results/nothing/synthetic/seed0/result.json"
     result.write_text(result.read_text().replace("0.0", "1.0", 1))

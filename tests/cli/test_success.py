@@ -24,7 +24,7 @@ def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_data_set_with_policies_and_a_model_trained_on_it(here: Path, capsys: pytest.CaptureFixture[str]):
-    run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
+    run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--quiet", "--record", "0"]
     assert main.main(run) == 0
     words = ["--policies", "runs/bc-smoke/synthetic/seed0/weights.safetensors", "--rows", "1500", "--quiet"]
     capsys.readouterr()

@@ -83,7 +83,7 @@ def test_the_best_of_a_grid_is_chosen_on_val_alone(here: Path, capsys: pytest.Ca
         ]
     assert main.main(["runs", "best", "--tag", "nearness", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["run"] == content()["winner"]["run"]
-    assert main.main([*command.split()[1:], "--split", "test", "--no-floors", "--quiet"]) == 0  # As the sweep said.
+    assert main.main([*command.split()[1:], "--split", "test", "--quiet"]) == 0  # As the sweep said.
     capsys.readouterr()
     assert main.main(["sweep", "--show"]) == 0
     assert "nearness" in capsys.readouterr().out

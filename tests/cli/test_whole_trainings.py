@@ -63,7 +63,7 @@ def test_a_run_that_is_killed_repeatedly_ends_like_an_uninterrupted_one(
     """With `--thorough`, a hundred runs are killed, each at a random moment; a run that ended starts anew."""
 
     def start(folder: str) -> Any:
-        return tiny_benchmark.start(here / "data", "run", *words, *FAST, "--no-floors", "--runs", folder)
+        return tiny_benchmark.start(here / "data", "run", *words, *FAST, "--runs", folder)
 
     def files() -> set[Path]:
         return {file for file in (here / "broken").rglob("*") if file.is_file()}

@@ -74,7 +74,7 @@ def test_a_training_goes_on_task_by_task(here: Path, monkeypatch: pytest.MonkeyP
             self.losing[name] = 1
             clusters.append(self)
 
-    words = ("run", "--method", TOY, "--preset", "quick", "--no-floors", "--quiet", "--split", "val")
+    words = ("run", "--method", TOY, "--preset", "quick", "--quiet", "--split", "val")
     words += ("--seed", "0", "3", "--record", "0")
     play(*words, "--threads", "1", "--runs", "whole")
     monkeypatch.setattr(ray_cluster, "RayCluster", Losing)

@@ -19,7 +19,7 @@ from tests.helpers.tiny_runs import constant_agent
 from tests.helpers.tiny_training import TOY
 
 pytestmark = pytest.mark.slow
-RUN = ("run", "--method", "exp", "--no-floors", "--quiet", "--threads", "1")
+RUN = ("run", "--method", "exp", "--quiet", "--threads", "1")
 
 
 @pytest.fixture
@@ -129,7 +129,7 @@ def test_an_agent_that_crashes_its_process_is_not_tried_again(
 ):
     agent = constant_agent(here, f"(open({str(here / 'tries')!r}, 'a').write('x'), __import__('os')._exit(3))")
     with tiny_cluster.started(here / "data", monkeypatch):
-        words = ("run", "--method", agent, "--split", "test", "--no-floors", "--quiet", "--cluster", "auto")
+        words = ("run", "--method", agent, "--split", "test", "--quiet", "--cluster", "auto")
         text = complaint(*words)
         assert "constant/synthetic/seed0/test-0000-0001: its process crashed; it is not tried again" in text
         assert (here / "tries").read_text() == "x"

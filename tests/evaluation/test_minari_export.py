@@ -181,7 +181,7 @@ def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], c
     assert summary["folder"] == "sets/dextron/synthetic-test-experts-v0"
     assert "already exists" in complaint(*words)
     assert "no data set" in complaint(*words, "--name", "mine")
-    run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--no-floors", "--quiet", "--record", "0"]
+    run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--quiet", "--record", "0"]
     assert main.main(run) == 0
     weights = "runs/bc-smoke/synthetic/seed0/weights.safetensors"
     assert main.main([*words, "--weights", weights, "--rows", "1", "--author", "A. Person"]) == 0

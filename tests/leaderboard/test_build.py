@@ -19,7 +19,7 @@ from dextron_bench.scores import standings
 
 TOY = "tests.helpers.toy_learner:Toy"
 FRESH = {"beacon": "b", "submission": "s", "splits": {}}
-QUIET = ("--quiet", "--no-floors", "--record", "0")
+QUIET = ("--quiet", "--record", "0")
 
 
 @pytest.fixture

@@ -35,7 +35,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def board(tiny_world: Path) -> Path:
     """A board with two baselines on a tiny benchmark."""
     for method in METHODS:
-        assert main.main(["run", "--method", method, "--no-floors", "--quiet"]) == 0
+        assert main.main(["run", "--method", method, "--quiet"]) == 0
     assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
     return tiny_world / "board"
 

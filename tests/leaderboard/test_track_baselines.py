@@ -19,7 +19,7 @@ RESULT = "results/reflex/synthetic/seed0/result.json"
 def board(tiny_world: Path) -> Path:
     """A board with two baselines on a tiny benchmark."""
     for method in ("nothing", "reflex"):
-        assert main.main(["run", "--method", method, "--no-floors", "--quiet"]) == 0
+        assert main.main(["run", "--method", method, "--quiet"]) == 0
     assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
     return tiny_world / "board"
 

@@ -99,7 +99,7 @@ def test_run_starts_trackers_beside_its_training(
         say("tracker rerun: 16 points")
 
     monkeypatch.setattr(launch, "following", following)
-    words = ["run", "--method", TOY, "--preset", "smoke", "--split", "test", "--no-floors", "--record", "0", "--quiet"]
+    words = ["run", "--method", TOY, "--preset", "smoke", "--split", "test", "--record", "0", "--quiet"]
     assert main.main([*words, "--json", "--tracker", "rerun", "--live", "--seed", "0", "3"]) == 0
     assert followed == [(["runs/toy-0.1/synthetic/training-0+3"], ["rerun", "live"])]
     printed = capsys.readouterr()

@@ -81,7 +81,9 @@ def constants() -> dict[str, Any]:
 
 def use_constants(values: dict[str, Any]) -> None:
     """Lets `world.model` work without the simulator, which the sandbox does not have."""
-    sys.modules["mujoco"] = ModuleType("mujoco")
+    simulator = ModuleType("dextron_bench.world.simulator")
+    simulator.mujoco = None  # type: ignore[attr-defined]
+    sys.modules[simulator.__name__] = simulator
     from dextron_bench.world import model
 
     arrays = {name: np.array(values[name]) for name in ("joints", "closed", "gain", "half_closed")}
