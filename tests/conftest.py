@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import pytest
 from dextron_bench.cli import main, output
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
-from tests.helpers import forged_bundles, tiny_benchmark, tiny_training
+from tests.helpers import abilities, forged_bundles, tiny_benchmark, tiny_training
 from tests.helpers.browser import open_browser
 from tests.helpers.small_release import SmallRelease, make_small_release
 
@@ -29,6 +29,22 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="slow tests with many more mutations and kills, and with real fresh settings",
     )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, pytest.CollectReport, Any]:
+    """A module that imports a package which is missing here is skipped."""
+    report = yield
+    abilities.skip_without(report, str(collector.path))
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, Any]:
+    """A test that fails because this machine cannot draw, or lacks a package, is skipped."""
+    report = yield
+    abilities.skip_without(report, str(item.path))
+    return report
 
 
 @pytest.fixture(autouse=True)
