@@ -39,9 +39,8 @@ def _set(variable: str, value: str | None) -> None:
 
 if TYPE_CHECKING:
     import mujoco
-    from mujoco.batch import Batch
 else:
     mujoco = load("mujoco")
-    Batch = load("mujoco.batch").Batch
+Batch: Any = load("mujoco.batch").Batch
 
 __all__ = ["Batch", "load", "mujoco"]
