@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from dextron_bench.world import model
 from dextron_bench.world.bottle import Bottle
-from dextron_bench.world.simulator import Batch
 
 FIELDS = ("body_mass", "body_inertia", "geom_friction", "geom_size", "geom_rbound", "geom_aabb", "bvh_aabb")
 
@@ -25,7 +25,8 @@ def model_bottle() -> Bottle:
 class Bottles:
     """Gives each simulation of a batch its own bottle; the physics is bit-equal to a model compiled with the bottle."""
 
-    def __init__(self, batch: Batch) -> None:
+    def __init__(self, batch: Any) -> None:
+        """Takes the `mujoco.batch.Batch` of the simulations."""
         self._batch = batch
         self._fields = {name: batch.expand(name) for name in FIELDS}
         self._body, self._geom, self._bounds = model.bottle_indices()
