@@ -7,16 +7,12 @@ import errno
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, locks
 
-try:
-    import fcntl
-except ImportError:  # On Windows, nothing stops two processes from changing one folder.
-    fcntl = None
-
+LOCK = ".locked"  # In a folder that a process changes, or in which it replaces another folder.
 EXCHANGE, HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux.
 OLD = ".old"  # Ending of the name of a folder that is being replaced; the name starts with a dot.
 
@@ -107,15 +103,9 @@ def _sync_tree(folder: Path) -> None:
 @contextmanager
 def locked(place: Path, changed: Path) -> Iterator[None]:
     """Holds the lock of a folder while `changed`, at or below it, is changed; raises FolderBusy."""
-    if fcntl is None:
-        yield
-        return
-    descriptor = os.open(place, os.O_RDONLY)
-    try:
+    with ExitStack() as lock:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise FolderBusy(f"another process is changing {changed}; wait for it, and run again") from None
+            lock.enter_context(locks.held(place / LOCK))
+        except locks.Held as error:
+            raise FolderBusy(f"another process is changing {changed}; wait for it, and run again ({error})") from None
         yield
-    finally:
-        os.close(descriptor)
