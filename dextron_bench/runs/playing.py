@@ -29,8 +29,10 @@ def shown(folder: RunFolder, report: Progress) -> Iterator[Progress]:
         nonlocal written, say
         if time.monotonic() - written >= PERIOD:
             written = time.monotonic()
-            with suppress(OSError, locks.Held):  # A full disk stops nothing here.
-                say = say or lock.enter_context(locks.held(file))
+            if say is None:
+                with suppress(OSError, locks.Held):
+                    say = lock.enter_context(locks.held(file))
+            if say is not None:
                 say(f"{done} of {total} episodes")
         report(done, total, note)
 

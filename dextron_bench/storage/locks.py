@@ -57,6 +57,7 @@ class Held(RuntimeError):
     """A lock that another process holds; the message says who, and when its file may be removed."""
 
     def __init__(self, file: Path, holder: Holder | None, is_certain: bool) -> None:
+        self.is_certain = is_certain
         holds = str(holder) if holder else "it does not say by whom"
         remedy = "" if is_certain else "; if that process has ended, remove the lock file"
         super().__init__(f"lock file {file}: {holds}{remedy}")
@@ -93,7 +94,7 @@ def held(file: Path) -> Iterator[Say]:
 
 def _say(file: Path, place: int, shown: str) -> None:
     """Writes a text into a lock file, after the line of its holder."""
-    with file.open("r+b") as content:
+    with suppress(OSError), file.open("r+b") as content:  # A full disk stops nothing here.
         content.seek(place)
         content.write(shown.encode())
         content.truncate()
@@ -154,8 +155,8 @@ def _remove_if_ended(file: Path) -> None:
             with held(file.with_name(f"{file.name}-{holder.token}")):
                 if _read(file)[0] == holder:
                     file.unlink()
-        except Held:
-            raise Held(file, holder, is_certain=False) from None
+        except Held as other:
+            raise Held(file, holder, other.is_certain) from None
     except FileNotFoundError:
         return
 
