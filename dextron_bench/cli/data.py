@@ -10,8 +10,8 @@ import tyro
 
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
-from dextron_bench.storage import home
 from dextron_bench.reaches.sources import SourceName
+from dextron_bench.storage import home
 
 
 @dataclass(frozen=True)

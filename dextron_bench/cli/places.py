@@ -42,6 +42,8 @@ def _nearest_folder(file: Path) -> Path:
 
 def _paths(command: Any) -> list[tuple[str, Path]]:
     """The flags of a command whose value is a path, the longest path first."""
-    values = [] if command is None else [(field.name, getattr(command, field.name)) for field in dataclasses.fields(command)]
+    values = (
+        [] if command is None else [(field.name, getattr(command, field.name)) for field in dataclasses.fields(command)]
+    )
     paths = [(f"--{name.replace('_', '-')}", value) for name, value in values if isinstance(value, Path)]
     return sorted(paths, key=lambda pair: -len(pair[1].absolute().parts))

@@ -101,10 +101,9 @@ def _say(file: Path, place: int, shown: str) -> None:
 
 
 def _is_of(holder: Holder, file: Path, content: BinaryIO) -> bool:
-    """True if a lock file is still this holder's. Some file systems let nobody read a locked file, not even its holder.
-    """
+    """True if a lock file is still this holder's."""
     if holder.has_flock:
-        return os.path.samestat(os.fstat(content.fileno()), file.stat())
+        return os.path.samestat(os.fstat(content.fileno()), file.stat())  # Some shares let nobody read a locked file.
     return _read(file)[0] == holder
 
 

@@ -28,8 +28,8 @@ def test_a_home_is_as_the_system_says(tmp_path: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.usefixtures("no_home")
 def test_without_a_home_the_message_says_what_to_do():
-    with pytest.raises(home.NoHome, match="^this user has no home folder: set X$"):
+    with pytest.raises(home.NoHome, match=r"^this user has no home folder: set X$"):
         home.folder("set X")
-    with pytest.raises(home.NoHome, match="^the home folder in ~/a is not known: write the whole path$"):
+    with pytest.raises(home.NoHome, match=r"^the home folder in ~/a is not known: write the whole path$"):
         home.expanded(Path("~/a"))
     assert home.expanded(Path("a/~")) == Path("a/~")

@@ -157,7 +157,7 @@ def test_a_file_that_names_no_process_says_what_to_do(tmp_path: Path, content: s
     file = tmp_path / ".locked"
     file.write_text(content)
     assert locks.is_held(file)
-    with pytest.raises(locks.Held, match="it does not say by whom; if that process has ended, remove the lock file$"):
+    with pytest.raises(locks.Held, match=r"it does not say by whom; if that process has ended, remove the lock file$"):
         locks.held(file).__enter__()
     file.unlink()
     with locks.held(file):
