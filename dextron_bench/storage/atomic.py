@@ -38,7 +38,7 @@ def write_atomically(file: Path, write: Callable[[Path], object]) -> None:
 
 def create_json(file: Path, value: Any) -> None:
     """Writes a new JSON file, as `write_json` does; raises FileExistsError if another process was faster."""
-    _write(file, _json(value), put_new)
+    _write(file, _json(value), _put_new_if_possible)
 
 
 def _write(file: Path, write: Callable[[Path], object], put: Callable[[Path, Path], object]) -> None:
@@ -77,6 +77,16 @@ def put_new(part: Path, file: Path) -> None:
             raise
     os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     os.replace(part, file)
+
+
+def _put_new_if_possible(part: Path, file: Path) -> None:
+    """As `put_new`; the last process wins where the file system lets no process make a file alone."""
+    try:
+        put_new(part, file)
+    except OSError as error:
+        if error.errno not in LACKING:
+            raise
+        os.replace(part, file)
 
 
 def sync(path: Path) -> None:

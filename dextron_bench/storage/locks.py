@@ -5,7 +5,7 @@ takes it over, if the end of the holder is certain:
 
 - Where the file system has `flock`, the holder also locks the file in this way, and the system ends that with the
   process, whatever container or machine it is on.
-- Elsewhere, number and start of a process tell, for a holder of the same start of the machine and the same container.
+- Elsewhere, number and start of a process prove it, if the machine has not started anew and the container is the same.
 
 Without certainty the file stays, and the message says when to remove it.
 """
@@ -38,7 +38,7 @@ Say = Callable[[str], None]  # Shows a text to processes that look at the lock.
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """The process that holds a lock. What the system does not tell is an empty text."""
+    """The process that holds a lock. What the system does not say is an empty text."""
 
     host: str
     process: int
@@ -70,32 +70,38 @@ def held(file: Path) -> Iterator[Say]:
     Yields what shows a text to others (`text`). Where no file can be made by one process alone, a line on stderr says
     so, and the block goes on.
     """
-    part = atomic.temporary(file)
     with ExitStack() as kept:
         with atomic.naming(file):
-            atomic.remove_abandoned(file, part)
-            content = kept.enter_context(part.open("wb"))
-            holder = _this_process(has_flock=_flock(content.fileno(), exclusive=True) is True)
-            content.write(line := json.dumps(asdict(holder)).encode() + b"\n")
-            content.flush()
-            if not holder.has_flock:
-                content.close()  # Windows removes no open file.
-            try:
-                _make(part, file)
-            finally:
-                part.unlink(missing_ok=True)
+            holder, content = _take(file, kept)
         try:
-            yield functools.partial(_say, file, len(line))
+            yield functools.partial(_say, file)
         finally:
             with suppress(OSError):  # Somebody may have removed it.
                 if _is_of(holder, file, content):
                     file.unlink()
 
 
-def _say(file: Path, place: int, shown: str) -> None:
+def _take(file: Path, kept: ExitStack) -> tuple[Holder, BinaryIO]:
+    """Makes the file of a lock, which stays open for `flock`; returns its holder and the open file. Raises Held."""
+    part = atomic.temporary(file)
+    atomic.remove_abandoned(file, part)
+    try:
+        content = kept.enter_context(part.open("wb"))
+        holder = _this_process(has_flock=_flock(content.fileno(), exclusive=True) is True)
+        content.write(json.dumps(asdict(holder)).encode() + b"\n")
+        content.flush()
+        if not holder.has_flock:
+            content.close()  # Windows removes no open file.
+        _make(part, file)
+    finally:
+        part.unlink(missing_ok=True)
+    return holder, content
+
+
+def _say(file: Path, shown: str) -> None:
     """Writes a text into a lock file, after the line of its holder."""
     with suppress(OSError), file.open("r+b") as content:  # A full disk stops nothing here.
-        content.seek(place)
+        content.seek(len(content.readline()))
         content.write(shown.encode())
         content.truncate()
 
@@ -134,9 +140,14 @@ def _make(part: Path, file: Path) -> None:
         except OSError as error:
             if error.errno not in atomic.LACKING:
                 raise
-            reason = f"this file system has no locks ({error.strerror})"
-            print(f"dextron-bench: {reason}: let no other process change {file.parent}", file=sys.stderr)
-            return None
+            return _warn(error.strerror)
+
+
+@functools.cache
+def _warn(reason: str) -> None:
+    """Says once that there are no locks."""
+    text = f"this file system has no locks ({reason}): let no other process work in the same folder"
+    print(f"dextron-bench: {text}", file=sys.stderr)
 
 
 def _remove_if_ended(file: Path) -> None:
@@ -185,10 +196,10 @@ def _is_alive(file: Path, holder: Holder | None) -> bool | None:
     if (start := _start(str(holder.process))) is not None:
         return start == holder.start
     try:
-        os.kill(holder.process, 0)  # Only Linux tells a boot.
+        os.kill(holder.process, 0)  # Where a system names a boot, this only asks; Windows would end the process.
     except ProcessLookupError:
         return False
-    except OSError:
+    except OSError:  # The process of another user, which the system hides.
         return None
     return None
 

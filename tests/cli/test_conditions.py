@@ -18,11 +18,9 @@ from tests.helpers.tiny_training import TOY
 
 TRAIN = ("run", "--method", TOY, "--seed", "0", "--record", "0", "--no-floors", "--quiet", "--split", "val")
 SHARED = [
-    ("no_flock",),
-    ("no_fcntl", "no_links"),
-    ("no_folder_fsync",),
-    ("no_fsync", "no_modes"),
-    ("process_one", "no_name", "no_mmap"),
+    ("no_flock", "no_links", "no_folder_fsync"),
+    pytest.param(("no_fcntl", "no_fsync", "no_modes"), marks=pytest.mark.slow),
+    pytest.param(("process_one", "no_name", "no_mmap"), marks=pytest.mark.slow),
 ]
 
 
@@ -39,6 +37,13 @@ def test_a_training_ends_with_the_same_bytes(training_world: Path, names: tuple[
     assert finish(tiny_benchmark.start(training_world / "data", *TRAIN, **environment)) == (0, "")
     assert tiny_training.contents(Path("runs")) == tiny_training.contents(Path("plain"))
     assert not list(Path("runs").rglob(LOCK))
+
+
+def test_a_training_where_nothing_can_be_locked_says_so_in_one_line(training_world: Path):
+    environment = conditions.environment("no_flock", "no_exclusive")
+    code, printed = finish(tiny_benchmark.start(training_world / "data", *TRAIN, **environment))
+    assert (code, printed.count("\n")) == (0, 1)
+    assert "let no other process work in the same folder" in printed
 
 
 def test_a_training_in_a_folder_whose_holder_is_elsewhere_says_which_file_to_remove(training_world: Path):

@@ -94,7 +94,8 @@ def test_a_damaged_config_is_named(tmp_path: Path):
 WRITER = """
 import sys
 from pathlib import Path
-from dextron_bench.storage import folder_config
+from dextron_bench.storage import folder_config, provenance
+provenance.collect = lambda physics: {"git": "1234"}
 folder, seed = Path(sys.argv[1]), int(sys.argv[2])
 for line in sys.stdin:
     try:
