@@ -11,6 +11,7 @@ import tyro
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
+from dextron_bench.storage import home
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Import:
         from dextron_bench.reaches.recorded import cache
 
         with progress_bar("reaches", self.quiet) as progress:
-            reaches = cache.import_release(self.source.expanduser(), progress=progress)
+            reaches = cache.import_release(home.expanded(self.source), progress=progress)
         print(f"{len(reaches)} reaches imported into {cache.cache_file()}")
         return DONE
 
@@ -107,7 +108,7 @@ class Agreement:
         from dextron_bench.evaluation import agreement
         from dextron_bench.reaches.sources import open_source
 
-        outcomes = agreement.read(self.file.expanduser())
+        outcomes = agreement.read(home.expanded(self.file))
         source = open_source("real")
         with progress_bar("episodes", self.quiet) as progress:
             returns = agreement.play(outcomes, source, progress)

@@ -11,6 +11,7 @@ import tyro
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
+from dextron_bench.storage import home
 
 if TYPE_CHECKING:
     from dextron_bench.evaluation.minari_export import Player
@@ -56,7 +57,7 @@ class Export:
         rows = min(self.rows, len(split.cases))
         export = minari_export.Export(name, split, rows, self._players(), self.author or minari_export.CONTRIBUTORS)
         with progress_bar("episodes", self.quiet) as progress:
-            folder = export.write(open_source(self.reaches), self.into.expanduser(), self.threads, progress)
+            folder = export.write(open_source(self.reaches), home.expanded(self.into), self.threads, progress)
         row = minari_export.summary(folder)
         if self.json:
             print_json({"name": name, "folder": str(folder), **row})

@@ -12,6 +12,7 @@ import tyro
 
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.storage import home
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,7 +55,7 @@ class Fit:
             file = Path(folder) / "model.npz"
             parameters.save(model, file)
             content = file.read_bytes()
-        into = self.into.expanduser()
+        into = home.expanded(self.into)
         atomic.write_atomically(into, lambda part: part.write_bytes(content))
         print(f"{into}: {len(content):,} bytes, {compared(content, shipped)}")
         return DONE

@@ -132,5 +132,5 @@ def _source(name: str) -> Finding:
         reaches = sources.open_source(name).names
     except (LookupError, ValueError, ImportError, OSError) as error:
         return Finding(f"reaches {name}", False, needed, str(error))
-    location = f", cache {cache.cache_file()}" if name == "real" else ""
+    location = f", {cache.imported() or 'DEXTRON_DATA'}" if name == "real" else ""
     return Finding(f"reaches {name}", True, needed, f"{len(reaches)}{location}")

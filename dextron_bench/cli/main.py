@@ -15,7 +15,7 @@ from typing import Annotated, Any, Union
 
 import tyro
 
-from dextron_bench.cli import method_flags, usage
+from dextron_bench.cli import method_flags, places, usage
 from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.cli.output import print_warning
@@ -42,6 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if broken := [word for word in words if not _is_utf8(word)]:
         print(f"dextron-bench: {broken[0]!a} is not valid UTF-8; rename the file or folder", file=sys.stderr)
         return USAGE
+    command = None
     try:
         command = _parse(words)
         usage.check_numbers(command)
@@ -55,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if debug:
             raise
         code, message = explain(error)
-        print_warning(message)
+        print_warning(message + places.advice(error, command))
         return code
 
 

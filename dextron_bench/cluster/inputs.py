@@ -46,8 +46,8 @@ class References:
 
 def imported_reaches(reaches: str) -> dict[str, Path]:
     """The file of imported reaches, as an input, if the source is `real` and they are imported on this machine."""
-    file = cache.cache_file()
-    return {f"{CACHE}/{file.name}": file} if reaches == "real" and file.exists() else {}
+    file = cache.imported() if reaches == "real" else None
+    return {f"{CACHE}/{file.name}": file} if file else {}
 
 
 def only_file(folder: Path) -> Path | None:

@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import os
 import pickle
+import secrets
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +20,8 @@ from dextron_bench.cluster.tasks import BadCluster, OtherVersion, PieceFailed, R
 from dextron_bench.storage.progress import Progress, no_progress
 
 LOCAL, AUTO, REMOTE = "local", "auto", "ray://"
-TOKEN = Path("~/.ray/auth_token")  # Ray's, which a cluster with authentication asks for.
+TOKEN = "~/.ray/auth_token"  # Ray's, which a cluster with authentication asks for.
+TOKENS = ("RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH")  # Variables with a token, and with the file of one.
 START = "start one with `ray start --head`, or use --cluster local"
 SETTINGS = {  # Of Ray, unless the user sets others.
     "RAY_USAGE_STATS_ENABLED": "0",
@@ -63,11 +65,13 @@ class RayCluster:
     def __enter__(self) -> RayCluster:
         for name, value in SETTINGS.items():
             os.environ.setdefault(name, value)
-        if self._address.startswith(REMOTE) and TOKEN.expanduser().exists():
+        if self._address.startswith(REMOTE) and os.path.exists(os.path.expanduser(TOKEN)):
             os.environ.setdefault("RAY_AUTH_MODE", "token")  # Only nodes of a cluster find out by themselves.
         self._ray = importlib.import_module("ray")
         with ExitStack() as quiet:
             quiet.enter_context(_without_messages())
+            if self._address == LOCAL:
+                quiet.enter_context(_token_without_home())
             self._connect()
             self._quiet = quiet.pop_all()
         self._perform = self._ray.remote(PERFORM)
@@ -198,6 +202,20 @@ class RayCluster:
 
 class RemoteError(Exception):
     """The traceback of an error on a node, as the cause of the driver's error."""
+
+
+@contextmanager
+def _token_without_home() -> Iterator[None]:
+    """A token for Ray on this machine, where Ray cannot write one into the home folder of the user."""
+    home = Path(os.path.expanduser("~"))
+    if any(name in os.environ for name in TOKENS) or (home.is_absolute() and os.access(home, os.W_OK)):
+        yield
+        return
+    os.environ[TOKENS[0]] = secrets.token_hex(32)
+    try:
+        yield
+    finally:
+        os.environ.pop(TOKENS[0], None)
 
 
 @contextmanager

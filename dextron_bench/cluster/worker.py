@@ -11,7 +11,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from dextron_bench.cluster import installation
@@ -61,7 +61,8 @@ def _perform(task: Task, folder: Path, places: Mapping[str, str], contents: Sequ
 
 def _node_folder() -> Path:
     """A folder of this node for what its tasks share."""
-    folder = Path(tempfile.gettempdir()) / f"dextron-bench-{getpass.getuser()}"
+    user = os.getuid() if hasattr(os, "getuid") else getpass.getuser()  # In a container, a user may have no name.
+    folder = Path(tempfile.gettempdir()) / f"dextron-bench-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)
     return folder
 
@@ -83,7 +84,8 @@ def _link_computed(runs: Path) -> None:
     """Lets tasks of one version on a node share what methods store in `cache`, such as expert episodes."""
     shared = _node_folder() / f"computed-{installation.version()['code']}"
     shared.mkdir(exist_ok=True)
-    (runs / COMPUTED).symlink_to(shared)
+    with suppress(OSError):  # Without symbolic links, each task computes it.
+        (runs / COMPUTED).symlink_to(shared)
 
 
 def _pin_threads(count: int) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 from collections.abc import Iterator, Sequence
@@ -18,7 +17,7 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import provenance
+from dextron_bench.storage import atomic, provenance
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import model, task
 
@@ -131,11 +130,11 @@ def _atomic_folder(folder: Path) -> Iterator[Path]:
     """A temporary folder that becomes `folder` after the block, or is removed after an error; raises BadExport."""
     if folder.exists():
         raise BadExport(f"{folder} already exists; remove it, or choose another --name or --into")
-    part = folder.absolute().with_name(f".{folder.name}.{os.getpid()}.part")  # Minari fails on relative paths.
+    part = atomic.temporary(folder.absolute())  # Minari fails on relative paths.
     part.mkdir(parents=True)
     try:
         yield part
-        os.rename(part, folder)
+        part.rename(folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 

@@ -42,7 +42,7 @@ def merge(verdict: Verdict, board: Path, agent: Path) -> list[Path]:
     with folders.replacing(board) as part:
         manifest, place = verdict.manifest, _put(verdict, part)
         if agent.is_dir():
-            shutil.copytree(agent, place / bundle.AGENT)
+            folders.copy_tree(agent, place / bundle.AGENT)
         highlights.record_outcomes(place, manifest["name"], manifest["reaches"], part.parent / highlights.FOLDER)
         built = [board / file.relative_to(part) for file in build.build(part)]
     return built

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import filecmp
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import atomic, hashing, schemas
-from dextron_bench.storage.folders import visible
+from dextron_bench.storage.folders import copy_tree, visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder, seed_folders
 
@@ -88,7 +87,7 @@ def differing_files(board: Path) -> list[str]:
     """A line for each built file of the board that differs from a new build of its results."""
     with TemporaryDirectory() as folder:
         copy = Path(folder) / "board"
-        shutil.copytree(board, copy)
+        copy_tree(board, copy)
         if (recordings := board.resolve().parent / FOLDER).exists():
             (Path(folder) / FOLDER).symlink_to(recordings)  # The page lists the recordings beside the board.
         build.build(copy)

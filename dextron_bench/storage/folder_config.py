@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from dextron_bench.storage import atomic, provenance, schemas
 from dextron_bench.storage.run_folder import RunFolder
 
+TRIES, PAUSE = 10, 0.1  # Looks at an empty config, and seconds between them; then it is damaged.
 RUN_ADVICE = "remove it, or choose another folder with --runs"
 
 
@@ -26,13 +29,17 @@ def write_or_check(folder: Path, config: Mapping[str, Any], defaults: Mapping[st
     """Writes config and provenance of a run if there is no config yet; raises the same errors as `check`.
 
     `config` contains the hash of the physics. `defaults` belong to a method whose config has only the settings that
-    differ from them. They are stored with it for readers, and never compared.
+    differ from them. They are stored with it for readers, and never compared. Of several processes that write at the
+    same time, one writes both files, and the others check.
     """
     run = RunFolder(folder)
-    if not run.config.exists():  # The config is written last: if it exists, the provenance exists too.
-        atomic.write_json(run.provenance, provenance.collect(config["physics"]))
-        atomic.write_json(run.config, {**config, "defaults": defaults} if defaults else config)
+    is_new = _create(run.config, {**config, "defaults": defaults} if defaults else config)
     _check(run.config, config, "run", RUN_ADVICE)
+    if is_new:
+        atomic.write_json(run.provenance, provenance.collect(config["physics"]))
+    elif not run.provenance.exists() and not run.episodes.exists():  # The writer of the config was killed, or is slow.
+        with suppress(FileExistsError):
+            atomic.create_json(run.provenance, provenance.collect(config["physics"]))
 
 
 def write_or_check_file(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
@@ -41,14 +48,26 @@ def write_or_check_file(file: Path, config: Mapping[str, Any], content: str, adv
     The message says that the folder holds another `content`, such as "search", names the entries that differ, and ends
     with `advice`.
     """
-    if not file.exists():
-        atomic.write_json(file, config)
+    _create(file, config)
     _check(file, config, content, advice)
+
+
+def _create(file: Path, config: Mapping[str, Any]) -> bool:
+    """Writes a config; False if there is one."""
+    if not file.exists():
+        with suppress(FileExistsError):
+            atomic.create_json(file, config)
+            return True
+    return False
 
 
 def _check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
     if not file.exists():
         return
+    for _ in range(TRIES):  # Where the file system has no links, the file is empty at first.
+        if file.stat().st_size:
+            break
+        time.sleep(PAUSE)
     stored, expected = schemas.read(file, schemas.OBJECT), json.loads(json.dumps(config))
     if names := list(differences(stored, expected)):
         raise FolderMismatch(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")

@@ -7,17 +7,14 @@ import errno
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, locks
 
-try:
-    import fcntl
-except ImportError:  # On Windows, nothing stops two processes from changing one folder.
-    fcntl = None
-
+LOCK = ".locked"  # In a folder that a process changes, or in which it replaces another folder.
 EXCHANGE, HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux.
+NO_EXCHANGE = atomic.LACKING | {errno.EPERM, errno.EXDEV, errno.ENOTTY}  # Then two renames do it, or say why not.
 OLD = ".old"  # Ending of the name of a folder that is being replaced; the name starts with a dot.
 
 
@@ -46,14 +43,14 @@ def replacing(folder: Path) -> Iterator[Path]:
     if another process replaces a folder beside this one.
     """
     folder = folder.resolve()
-    part = folder.with_name(f".{folder.name}{atomic.PART}")
+    part = _part(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with locked(folder.parent, folder), atomic.naming(folder):
         recover(folder)
         shutil.rmtree(part, ignore_errors=True)
         try:
             if folder.exists():
-                shutil.copytree(folder, part, symlinks=True)
+                copy_tree(folder, part)
             else:
                 part.mkdir()
             yield part
@@ -65,8 +62,9 @@ def replacing(folder: Path) -> Iterator[Path]:
 
 def recover(folder: Path) -> None:
     """Restores a folder whose replacement was interrupted on a system that has no exchange of folders."""
-    old = folder.with_name(f".{folder.name}{OLD}")
-    if old.exists() and not folder.exists():
+    old = _old(folder)
+    if old.exists() and (_part(folder).exists() or not folder.exists()):  # Else the new folder has its name.
+        shutil.rmtree(folder, ignore_errors=True)
         old.rename(folder)
     shutil.rmtree(old, ignore_errors=True)
 
@@ -76,11 +74,57 @@ def _put(part: Path, folder: Path) -> None:
     if not folder.exists():
         part.rename(folder)
     elif not _exchange(part, folder):
-        old = folder.with_name(f".{folder.name}{OLD}")
-        folder.rename(old)
+        old = _old(folder)
+        _move_away(folder, old)
         part.rename(folder)
         shutil.rmtree(old, ignore_errors=True)
     atomic.sync(folder.parent)
+
+
+def _part(folder: Path) -> Path:
+    """The new content of a folder; whoever writes it holds the lock."""
+    return folder.with_name(f".{folder.name}{atomic.PART}")
+
+
+def _old(folder: Path) -> Path:
+    """The whole old content of a folder."""
+    return folder.with_name(f".{folder.name}{OLD}")
+
+
+def _move_away(folder: Path, old: Path) -> None:
+    """Gives a folder another name, or copies and removes it: a folder of a container's image cannot be renamed."""
+    try:
+        folder.rename(old)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        copy = _part(old)
+        shutil.rmtree(copy, ignore_errors=True)  # From a process that was killed.
+        copy_tree(folder, copy)
+        _sync_tree(copy)
+        copy.rename(old)
+        shutil.rmtree(folder)
+
+
+def copy_tree(folder: Path, into: Path) -> None:
+    """Copies a folder, with modes and times where the file system has them; links stay links."""
+    into.mkdir()
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            target = into / entry.name
+            if entry.is_symlink():
+                target.symlink_to(os.readlink(entry.path))
+            elif entry.is_dir():
+                copy_tree(Path(entry.path), target)
+            else:
+                shutil.copyfile(entry.path, target)
+                _copy_times(Path(entry.path), target)
+    _copy_times(folder, into)
+
+
+def _copy_times(source: Path, target: Path) -> None:
+    with suppress(OSError):  # EPERM of FAT, ENOTSUP of some shares: content is what counts.
+        shutil.copystat(source, target)
 
 
 def _exchange(first: Path, second: Path) -> bool:
@@ -90,7 +134,7 @@ def _exchange(first: Path, second: Path) -> bool:
         return False
     if rename(HERE, os.fsencode(first), HERE, os.fsencode(second), EXCHANGE) == 0:
         return True
-    if (number := ctypes.get_errno()) in (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP):
+    if (number := ctypes.get_errno()) in NO_EXCHANGE:
         return False
     raise OSError(number, os.strerror(number), str(second))
 
@@ -107,15 +151,9 @@ def _sync_tree(folder: Path) -> None:
 @contextmanager
 def locked(place: Path, changed: Path) -> Iterator[None]:
     """Holds the lock of a folder while `changed`, at or below it, is changed; raises FolderBusy."""
-    if fcntl is None:
-        yield
-        return
-    descriptor = os.open(place, os.O_RDONLY)
-    try:
+    with ExitStack() as lock:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise FolderBusy(f"another process is changing {changed}; wait for it, and run again") from None
+            lock.enter_context(locks.held(place / LOCK))
+        except locks.Held as error:
+            raise FolderBusy(f"another process is changing {changed}; wait for it, and run again ({error})") from None
         yield
-    finally:
-        os.close(descriptor)

@@ -6,6 +6,7 @@ sign. Files of version 0.1 and files of others have none.
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,6 +20,7 @@ from dextron_bench.storage import atomic, hashing
 ABOUT = "about"  # The only key of a file's metadata: several keys would have no fixed order.
 DTYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
 SEAL = "seal"  # Entry of the metadata that is written and removed here: its own digest, and the arrays'.
+NO_MAPS = atomic.LACKING | {errno.ENODEV}  # Of a file system whose files cannot be mapped; they are read instead.
 LENGTH = 8  # [bytes] at the start of a file that hold the length of the header.
 LONGEST_HEADER = 16 * 2**20  # [bytes]; a parsed header takes up to thirty times as much memory.
 
@@ -115,7 +117,14 @@ def _memory_map(file: Path, start: int, entry: Mapping[str, Any]) -> np.ndarray:
     begin, end = entry["data_offsets"]
     if end - begin != dtype.itemsize * int(np.prod(shape)):
         raise ValueError(f"an array of shape {shape} has {end - begin} bytes")
-    return np.memmap(file, dtype, "r", start + begin, shape)
+    try:
+        return np.memmap(file, dtype, "r", start + begin, shape)
+    except OSError as error:
+        if error.errno not in NO_MAPS:
+            raise
+    array = np.fromfile(file, dtype, int(np.prod(shape)), offset=start + begin).reshape(shape)
+    array.flags.writeable = False
+    return array
 
 
 def _content(file: Path) -> bytes:

@@ -9,28 +9,23 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Trainer
-from dextron_bench.storage import atomic, hashing, schemas, tensors
+from dextron_bench.storage import atomic, hashing, locks, schemas, tensors
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.folders import visible
 from dextron_bench.training import checkpoint_list, metric_rows
 from dextron_bench.training.metric_rows import METRICS
 
-try:
-    import fcntl
-except ImportError:  # On Windows, nothing stops two processes from training in one folder.
-    fcntl = None
-
 CHECKPOINT = "checkpoint.safetensors"
 JOURNALS = "journals"
-LOCK = ".lock"
+LOCK = ".locked"  # Earlier versions left a file .lock.
 
 
 class Busy(RuntimeError):
@@ -62,30 +57,22 @@ class Checkpoints:
     def locked(self) -> Iterator[None]:
         """Locks the folder for this process; raises Busy if another process holds the lock."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / LOCK).open("w") as lock:
+        with ExitStack() as lock:
             try:
-                if fcntl:
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
+                lock.enter_context(locks.held(self.folder / LOCK))
+            except locks.Held as error:
                 raise Busy(
-                    f"another process is training in {self.folder}; wait for it, or choose another --runs"
+                    f"another process is training in {self.folder}; wait for it, or choose another --runs ({error})"
                 ) from None
             for file in self.folder.rglob(f".*{atomic.PART}"):  # From a process that was killed while it wrote.
-                file.unlink()
+                if not file.name.startswith(f".{LOCK}"):  # Others that ask for the lock write this.
+                    file.unlink()
             yield
 
     @property
     def is_locked(self) -> bool:
         """True if another process trains in the folder."""
-        file = self.folder / LOCK
-        if fcntl is None or not file.exists():
-            return False
-        with file.open() as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except BlockingIOError:
-                return True
-        return False
+        return locks.is_held(self.folder / LOCK)
 
     def progress(self) -> TrainingProgress | None:
         """The progress in the last checkpoint, None if there is no checkpoint; raises DamagedFile."""

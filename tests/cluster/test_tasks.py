@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import pwd
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -152,3 +154,40 @@ def test_help_is_quick_because_it_imports_no_ray(capsys: pytest.CaptureFixture[s
     with pytest.raises(SystemExit):
         main.main(["mc", "--help"])
     assert "--cluster local|auto|ray://HOST:PORT" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_node_of_a_user_without_a_name_has_a_folder(monkeypatch: pytest.MonkeyPatch):
+    def unknown(*_: object) -> str:
+        raise KeyError("getpwuid(): uid not found: 12345")
+
+    for name in ("LOGNAME", "USER", "LNAME", "USERNAME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    assert worker._node_folder().name == f"dextron-bench-{os.getuid()}"
+
+
+def test_tasks_share_nothing_where_there_are_no_symbolic_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "symlink", refuse)
+    worker._link_computed(tmp_path)
+    assert not list(tmp_path.glob(worker.COMPUTED))
+
+
+@pytest.mark.parametrize("home", [None, "/proc"])
+def test_ray_gets_a_token_where_it_cannot_write_one(monkeypatch: pytest.MonkeyPatch, home: str | None):
+    for name in ray_cluster.TOKENS:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os.path, "expanduser", lambda path: home or path)
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    with ray_cluster._token_without_home():
+        assert len(os.environ["RAY_AUTH_TOKEN"]) == 64
+    assert "RAY_AUTH_TOKEN" not in os.environ
+
+
+def test_ray_writes_its_own_token_into_a_home_that_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delenv("RAY_AUTH_TOKEN", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with ray_cluster._token_without_home():
+        assert "RAY_AUTH_TOKEN" not in os.environ

@@ -44,17 +44,25 @@ def test_the_file_is_gone_at_the_end_and_reports_go_on(tmp_path: Path, monkeypat
     with playing.shown(RunFolder(tmp_path), lambda done, total, note="": reports.append((done, total))) as report:
         report(1, 8)
         report(2, 8)  # Within a second of the first: shown to the caller alone.
-        assert (tmp_path / playing.FILE).read_text() == "1 of 8 episodes"
+        assert playing.state(RunFolder(tmp_path)) == "1 of 8 episodes"
         report(3, 8)
-        assert (tmp_path / playing.FILE).read_text() == "3 of 8 episodes"
+        assert playing.state(RunFolder(tmp_path)) == "3 of 8 episodes"
     assert reports == [(1, 8), (2, 8), (3, 8)]
     assert not (tmp_path / playing.FILE).exists()
 
 
-def test_two_processes_may_play_the_same_run(tmp_path: Path):
-    with (
-        playing.shown(RunFolder(tmp_path), no_progress),
-        playing.shown(RunFolder(tmp_path), no_progress) as report,
-    ):
-        report(1, 2)
+def test_two_processes_may_play_the_same_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The second is shown when the first has ended, as the shares of a run end one after the other."""
+    monkeypatch.setattr(playing, "PERIOD", 0.0)
+    with playing.shown(RunFolder(tmp_path), no_progress) as second:
+        with playing.shown(RunFolder(tmp_path), no_progress) as first:
+            first(1, 2)
+            second(3, 9)
+        assert playing.state(RunFolder(tmp_path)) == "3 of 9 episodes"
+    with playing.shown(RunFolder(tmp_path), no_progress) as first:
+        with playing.shown(RunFolder(tmp_path), no_progress) as second:
+            first(1, 2)
+            second(3, 9)
+            assert playing.state(RunFolder(tmp_path)) == "1 of 2 episodes"
+            assert not list(tmp_path.glob("*.part"))
         assert playing.state(RunFolder(tmp_path)) == "1 of 2 episodes"

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +16,7 @@ import pytest
 from dextron_bench.storage import folder_config, provenance
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folder_config import FolderMismatch
+from tests.helpers import conditions
 
 CONFIG: dict[str, Any] = {"method": "bc", "seed": 0, "settings": {"rate": 0.1, "shape": (2, 3)}, "physics": "abc"}
 
@@ -83,3 +89,75 @@ def test_a_damaged_config_is_named(tmp_path: Path):
     (tmp_path / "config.json").write_text("{")
     with pytest.raises(DamagedFile, match=r"config\.json is damaged"):
         folder_config.check(tmp_path, CONFIG)
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from dextron_bench.storage import folder_config, provenance
+provenance.collect = lambda physics: {"git": "1234"}
+folder, seed = Path(sys.argv[1]), int(sys.argv[2])
+for line in sys.stdin:
+    try:
+        folder_config.write_or_check(folder / line.strip(), {"seed": seed, "physics": "abc"})
+        print("agrees", flush=True)
+    except folder_config.FolderMismatch:
+        print("differs", flush=True)
+"""
+
+
+def simultaneous(folder: Path, seeds: Sequence[int], *names: str) -> list[list[str]]:
+    """The answers of processes that write a config of their seed to thirty folders, each folder at the same time."""
+    with ExitStack() as stack:
+        writers = [
+            stack.enter_context(
+                subprocess.Popen(
+                    [sys.executable, "-c", WRITER, str(folder), str(seed)],
+                    env=conditions.environment(*names),
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    text=True,
+                )
+            )
+            for seed in seeds
+        ]
+        answers = []
+        for number in range(30):
+            for writer in writers:
+                assert writer.stdin is not None
+                writer.stdin.write(f"{number}\n")
+                writer.stdin.flush()
+            answers.append([writer.stdout.readline().strip() for writer in writers if writer.stdout is not None])
+        return answers
+
+
+@pytest.mark.parametrize("names", [("process_one",), ("process_one", "no_links")], ids="+".join)
+def test_processes_with_one_number_write_one_config(tmp_path: Path, names: tuple[str, ...]):
+    """Two containers that share a folder are both process 1; none loses a temporary file to the other one."""
+    assert simultaneous(tmp_path, (0, 0, 0, 0), *names) == [["agrees"] * 4] * 30
+    for number in range(30):
+        assert sorted(os.listdir(tmp_path / str(number))) == ["config.json", "provenance.json"]
+
+
+@pytest.mark.parametrize("names", [("process_one",), ("process_one", "no_links")], ids="+".join)
+def test_of_two_configs_written_at_the_same_time_one_wins_and_the_other_is_refused(
+    tmp_path: Path, names: tuple[str, ...]
+):
+    for number, answers in enumerate(simultaneous(tmp_path, (0, 1), *names)):
+        winner = json.loads((tmp_path / str(number) / "config.json").read_text())["seed"]
+        assert answers == [["agrees", "differs"], ["differs", "agrees"]][winner]
+
+
+def test_a_writer_that_was_killed_after_its_config_leaves_a_folder_that_goes_on(tmp_path: Path):
+    folder_config.write_or_check(tmp_path, CONFIG)
+    (tmp_path / "provenance.json").unlink()
+    folder_config.write_or_check(tmp_path, CONFIG)
+    assert json.loads((tmp_path / "provenance.json").read_text())["git"] == "1234"
+
+
+def test_a_config_that_is_empty_for_a_moment_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Where the file system has no links, its name is taken before it has its content."""
+    file = tmp_path / "config.json"
+    file.touch()
+    monkeypatch.setattr(folder_config.time, "sleep", lambda seconds: file.write_text(json.dumps(CONFIG)))
+    folder_config.write_or_check(tmp_path, CONFIG)

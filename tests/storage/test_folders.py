@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import ast
+import ctypes
+import errno
 import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -24,11 +27,18 @@ MAY_LIST = {  # Modules that list folders themselves, and why hidden names do no
     "dextron_bench/leaderboard/submission/starter.py": "asks whether a folder is empty",
 }
 KILLED = """
-import os, sys
+import errno, os, sys
 from pathlib import Path
 from dextron_bench.storage import folders
 if sys.argv[2] == "renames":
     folders._exchange = lambda first, second: False
+if sys.argv[2] == "copies":  # A folder in the image of a container.
+    folders._exchange, rename = lambda first, second: False, os.rename
+    def refusing(first, second):
+        if first == Path(sys.argv[1]):
+            raise OSError(errno.EXDEV, "Invalid cross-device link")
+        rename(first, second)
+    os.rename = refusing
 steps = int(sys.argv[3])
 def step(event, arguments):
     global steps
@@ -102,8 +112,62 @@ def test_two_processes_do_not_replace_one_folder(tmp_path: Path):
     assert os.listdir(tmp_path) == ["board"]
 
 
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOSYS, errno.EPERM, errno.EXDEV])
+def test_folders_that_cannot_be_exchanged_are_renamed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int):
+    """EPERM is the answer of an old sandbox of containers to a call that it does not know."""
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace(renameat2=lambda *_: -1))
+    monkeypatch.setattr(ctypes, "get_errno", lambda: number)
+    for content in ("old", "new"):
+        with folders.replacing(tmp_path / "board") as part:
+            (part / "a.txt").write_text(content)
+    assert ((tmp_path / "board/a.txt").read_text(), os.listdir(tmp_path)) == ("new", ["board"])
+
+
+def test_a_folder_that_cannot_be_renamed_is_copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A folder of a container's image, to which overlayfs answers EXDEV."""
+    board, rename = tmp_path / "board", os.rename
+    (board / "sub").mkdir(parents=True)
+    (board / "sub/a.txt").write_text("old")
+
+    def refusing(source: Path, target: Path) -> None:
+        if source == board:
+            raise OSError(errno.EXDEV, os.strerror(errno.EXDEV))
+        rename(source, target)
+
+    monkeypatch.setattr(folders, "_exchange", lambda first, second: False)
+    monkeypatch.setattr(os, "rename", refusing)
+    with folders.replacing(board) as part:
+        (part / "sub/a.txt").write_text("new")
+    assert ((board / "sub/a.txt").read_text(), os.listdir(tmp_path)) == ("new", ["board"])
+
+
+def test_a_replacement_that_was_killed_while_the_old_folder_was_removed_is_taken_back(tmp_path: Path):
+    for name in ("board", ".board.old", ".board.part"):
+        (tmp_path / name).mkdir()
+    (tmp_path / ".board.old/a.txt").write_text("old")
+    folders.recover(tmp_path / "board")
+    assert os.listdir(tmp_path / "board") == ["a.txt"]
+
+
+def test_a_copy_keeps_modes_and_links_where_the_file_system_has_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "a/b").mkdir(parents=True)
+    (tmp_path / "a/b/run").write_text("x")
+    (tmp_path / "a/b/run").chmod(0o755)
+    (tmp_path / "a/link").symlink_to("b/run")
+    folders.copy_tree(tmp_path / "a", tmp_path / "c")
+    assert ((tmp_path / "c/b/run").stat().st_mode & 0o777, os.readlink(tmp_path / "c/link")) == (0o755, "b/run")
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    for name in ("chmod", "utime"):
+        monkeypatch.setattr(os, name, refuse)
+    folders.copy_tree(tmp_path / "a", tmp_path / "d")
+    assert (tmp_path / "d/b/run").read_text() == "x"
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("way", ["exchange", "renames"])
+@pytest.mark.parametrize("way", ["exchange", "renames", "copies"])
 def test_a_process_killed_at_any_step_leaves_the_old_or_the_new_folder(tmp_path: Path, way: str):
     board, steps, code = tmp_path / "board", 0, 9
     seen = set()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -102,3 +104,19 @@ def test_a_file_without_digests_is_read(tmp_path: Path):
     file.write_bytes(safetensors.numpy.save({"a": ARRAYS["b"]}, {"about": '{"label": "bc"}'}))
     assert tensors.read(file)["a"].tolist() == [1, 2]
     assert tensors.read_about(file) == {"label": "bc"}
+
+
+def test_a_file_that_cannot_be_mapped_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Some FUSE file systems map no files."""
+    file, array = tmp_path / "a.safetensors", np.arange(6.0).reshape(2, 3)
+    tensors.write(file, {"a": array, "b": array[:0]}, {})
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+
+    monkeypatch.setattr(np, "memmap", refuse)
+    arrays = tensors.memory_mapped(file)
+    np.testing.assert_array_equal(arrays["a"], array)
+    assert arrays["b"].shape == (0, 3)
+    with pytest.raises(ValueError, match="read-only"):
+        arrays["a"][0, 0] = 9.0

@@ -82,23 +82,23 @@ def test_a_training_killed_before_or_after_any_write_ends_with_the_same_bytes(
 ):
     train(tmp_path / "unbroken")
     unbroken = tiny_training.contents(tmp_path / "unbroken")
-    write_atomically = atomic.write_atomically
+    write_file = atomic._write
     writes = 0
     for writes in range(1000):
         folder, left = tmp_path / f"killed{writes}", [writes]
 
-        def killed(file: Path, write: Any, left: list[int] = left) -> None:
+        def killed(file: Path, write: Any, put: Any, left: list[int] = left) -> None:
             left[0] -= 2
             if left[0] == -2:  # An even number: before the write, with a half-written file left behind.
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.with_name(f".{file.name}.1.part").write_bytes(b"half")
                 raise Killed
-            write_atomically(file, write)
+            write_file(file, write, put)
             if left[0] == -1:
                 raise Killed
 
         with monkeypatch.context() as patched:
-            patched.setattr(atomic, "write_atomically", killed)
+            patched.setattr(atomic, "_write", killed)
             try:
                 train(folder)
                 break

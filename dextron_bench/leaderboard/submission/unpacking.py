@@ -37,5 +37,9 @@ def unpack_for_viewing(file: Path, runs: Path) -> Path:
         for run in seed_folders(part):
             for fault in episode_tables.faults(episode_tables.read(run.episodes, splits), splits):
                 raise bundle.BadBundle(f"{file}: {run.path.name}: {fault}")
-        part.replace(place)
+        try:
+            part.replace(place)
+        except OSError:
+            if not place.is_dir():  # Else another process has unpacked it meanwhile.
+                raise
     return place

@@ -18,6 +18,7 @@ import numpy as np
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import parsing, release
 from dextron_bench.reaches.recorded.release import Manifest
+from dextron_bench.storage import home
 from dextron_bench.storage.atomic import write_atomically
 from dextron_bench.storage.progress import Progress, no_progress
 
@@ -37,31 +38,42 @@ class MissingData(LookupError):
 
 
 def cache_folder() -> Path:
-    """The folder for imported data: DEXTRON_CACHE, or the platform's default for caches."""
-    if folder := os.environ.get("DEXTRON_CACHE"):
-        return Path(folder).expanduser()
+    """The folder for imported data: DEXTRON_CACHE, or the platform's default for caches; raises NoHome."""
+    if named := os.environ.get("DEXTRON_CACHE"):
+        return home.expanded(Path(named))
+    if named := os.environ.get({"win32": "LOCALAPPDATA", "darwin": ""}.get(sys.platform, "XDG_CACHE_HOME")):
+        return Path(named) / "dextron-bench"
+    base = home.folder("DEXTRON_CACHE names a folder for imported data")
     if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
+        base = base / "Library" / "Caches"
     elif sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+        base = base / "AppData" / "Local"
     else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        base = base / ".cache"
     return base / "dextron-bench"
 
 
 def cache_file() -> Path:
-    """The path of the file of imported reaches, which need not exist."""
+    """The path of the file of imported reaches, which need not exist; raises NoHome."""
     return cache_folder() / CACHE_FILE
+
+
+def imported() -> Path | None:
+    """The file of imported reaches, None if there is none."""
+    try:
+        return file if (file := cache_file()).exists() else None
+    except (home.NoHome, PermissionError):
+        return None
 
 
 def import_release(location: Path, manifest: Manifest | None = None, progress: Progress = no_progress) -> list[Reach]:
     """Reads and checks the release at `location`, stores it in the cache, and returns its reaches.
 
-    Raises ReleaseError if a file differs from the published one, OSError if the cache cannot be written.
+    Raises ReleaseError if a file differs from the published one, OSError if the cache cannot be written, NoHome.
     """
-    manifest = manifest or Manifest.load()
+    file, manifest = cache_file(), manifest or Manifest.load()
     reaches = release.read(location, manifest, progress)
-    _write(cache_file(), reaches, manifest)
+    _write(file, reaches, manifest)
     return reaches
 
 
@@ -71,11 +83,14 @@ def load_reaches(manifest: Manifest | None = None) -> list[Reach]:
     Raises MissingData if neither can be read, ReleaseError as `import_release` does.
     """
     manifest = manifest or Manifest.load()
-    cached, problem = _read(cache_file(), manifest)
+    try:
+        cached, problem = _read(cache_file(), manifest)
+    except home.NoHome as error:
+        cached, problem = None, f"have not been imported ({error})"
     if cached is not None:
         return cached
     if location := os.environ.get("DEXTRON_DATA"):
-        return release.read(Path(location).expanduser(), manifest)
+        return release.read(home.expanded(Path(location)), manifest)
     raise MissingData(problem)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import IO
 
 from dextron_bench.reaches.reach import Reach
-from dextron_bench.reaches.recorded.cache import import_release
+from dextron_bench.reaches.recorded.cache import cache_file, import_release
 from dextron_bench.reaches.recorded.release import Manifest
 from dextron_bench.storage.progress import Progress, no_progress
 
@@ -34,8 +34,9 @@ def fetch(manifest: Manifest | None = None, progress: Progress = no_progress, ur
     """Downloads the release, imports it as `cache.import_release` does, and returns its reaches.
 
     Calls `progress` with the number of bytes so far, and the total or 0 if the server does not report it. Raises
-    FetchError, ReleaseError or OSError.
+    FetchError, ReleaseError, NoHome or OSError.
     """
+    cache_file()  # Without a place for the reaches, nothing is downloaded.
     with tempfile.TemporaryDirectory(prefix="dextron-bench-") as folder:
         file = Path(folder) / "release.zip"
         with file.open("wb") as target:

@@ -6,11 +6,13 @@ import json
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from dextron_bench.leaderboard.submission import bundle, unpacking
 from dextron_bench.leaderboard.submission.declaration import Declaration
+from dextron_bench.storage import hashing
 
 
 @pytest.fixture
@@ -32,3 +34,18 @@ def test_a_bundle_without_the_episodes_of_a_seed_is_named(empty: Path, tmp_path:
 def test_what_is_no_file_is_refused(tmp_path: Path):
     with pytest.raises(bundle.BadBundle, match="is not a file"):
         unpacking.unpack_for_viewing(tmp_path, tmp_path / "runs")
+
+
+def test_two_processes_may_unpack_one_bundle(empty: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The first to end gives the folder its name, and the other one takes that."""
+    place = tmp_path / "runs" / unpacking.FOLDER / hashing.sha256(empty)[:16]
+
+    def unpack(file: Path, part: Path) -> dict[str, Any]:
+        for folder in (part, place):
+            folder.mkdir()
+            (folder / "bundle.json").touch()
+        return {"seeds": [], "reaches": "synthetic"}
+
+    monkeypatch.setattr(bundle, "unpack", unpack)
+    assert unpacking.unpack_for_viewing(empty, tmp_path / "runs") == place
+    assert [path.name for path in place.parent.iterdir()] == [place.name]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import pwd
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.recorded.release import Manifest
+from dextron_bench.storage.home import NoHome
 from tests.helpers.small_release import NAMES, SmallRelease
 
 
@@ -106,3 +108,39 @@ def test_the_authors_release_is_imported_completely(release: Path):
     assert bit_equal(imported, recorded_cache.load_reaches())
     assert 0.84 < min(reach.duration for reach in imported) < max(reach.duration for reach in imported) < 2.19
     assert all(np.all(np.diff(reach.times) > 0) and 0 < reach.reached < reach.duration for reach in imported)
+
+
+@pytest.fixture
+def no_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user without a name and a home, and no variable that names a folder."""
+
+    def unknown(number: int) -> None:
+        raise KeyError("getpwuid(): uid not found: 12345")
+
+    for name in ("HOME", "XDG_CACHE_HOME", "DEXTRON_CACHE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+
+
+@pytest.mark.usefixtures("no_home")
+def test_a_user_without_a_home_reads_the_release_of_the_environment(
+    small_release: SmallRelease, monkeypatch: pytest.MonkeyPatch
+):
+    manifest = Manifest.load(small_release.manifest)
+    with pytest.raises(recorded_cache.MissingData, match=r"no home folder: DEXTRON_CACHE names .*data fetch"):
+        recorded_cache.load_reaches(manifest)
+    assert recorded_cache.imported() is None
+    monkeypatch.setenv("DEXTRON_DATA", str(small_release.unpacked()))
+    assert [reach.name for reach in recorded_cache.load_reaches(manifest)] == list(NAMES)
+
+
+@pytest.mark.usefixtures("no_home")
+def test_a_user_without_a_home_imports_into_a_folder_of_choice(
+    small_release: SmallRelease, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    manifest = Manifest.load(small_release.manifest)
+    with pytest.raises(NoHome, match="DEXTRON_CACHE names a folder for imported data"):
+        recorded_cache.import_release(small_release.zip(), manifest)
+    monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
+    recorded_cache.import_release(small_release.zip(), manifest)
+    assert recorded_cache.imported() == tmp_path / "cache" / recorded_cache.CACHE_FILE
