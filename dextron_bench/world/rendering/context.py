@@ -1,0 +1,71 @@
+"""OpenGL contexts for drawing off screen, and what a process must do before its first one."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from contextlib import suppress
+from ctypes.util import find_library
+from functools import cache
+from importlib import import_module
+from typing import Protocol
+
+LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # The library of each off-screen backend, best first.
+INSTALL = (
+    "install EGL (Debian: apt install libegl1 libopengl0 libgl1-mesa-dri) or OSMesa (apt install libosmesa6), "
+    "and set MUJOCO_GL to egl or osmesa"
+)
+_drew: list[int] = []  # The process that created the first context: this one, or one that it was forked from.
+
+
+class NoGraphics(RuntimeError):
+    """Off-screen rendering is not possible; the message says what to install or to change."""
+
+
+class Context(Protocol):
+    """An OpenGL context."""
+
+    def make_current(self) -> None: ...
+    def free(self) -> None: ...
+
+
+def create_context(width: int, height: int) -> Context:
+    """Creates an OpenGL context with the backend that MUJOCO_GL names, or the first with an installed library.
+
+    The context is current. Raises NoGraphics.
+    """
+    refuse_fork()
+    backend = os.environ.get("MUJOCO_GL", "").lower().strip()
+    backend = backend or next((name for name, library in LIBRARIES.items() if find_library(library)), "")
+    if backend not in (*LIBRARIES, "glfw"):
+        raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={backend!r}: {INSTALL}")
+    _import_triton()
+    try:
+        with warnings.catch_warnings(action="ignore"):  # GLFW warns of the errors that are raised below.
+            context = import_module(f"mujoco.{backend}").GLContext(width, height)
+            context.make_current()
+    except Exception as error:  # Each library has its own errors; PyOpenGL without a library: AttributeError.
+        raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={backend}: {error}; {INSTALL}") from error
+    if not _drew:
+        _drew.append(os.getpid())
+    return context
+
+
+def refuse_fork() -> None:
+    """Raises NoGraphics in a process that was forked from one that has drawn: drawing would hang there for ever."""
+    if _drew and os.getpid() not in _drew:
+        raise NoGraphics(
+            "cannot draw in a process that was forked from one that has drawn, because the threads of its graphics "
+            "driver are missing here; start it with the method 'spawn' or 'forkserver', or draw only after the fork"
+        )
+
+
+@cache
+def _import_triton() -> None:
+    """Imports Triton, if it works here, before the first context.
+
+    Mesa and Triton each contain an LLVM. The optimizers of torch import Triton, which ends a process that has drawn
+    with Mesa in a segmentation fault; in the other order, both work.
+    """
+    with suppress(Exception):
+        import_module("triton")
