@@ -55,8 +55,8 @@ class SettingQueue:
     def __init__(self, reaches: str | Source, settings: Sequence[Setting] | None = None) -> None:
         """Takes a source or its name.
 
-        A setting may be a mapping, as in an info. Raises UnknownSource, ValueError if the list is empty, SettingError if
-        it is no list or holds something else, and TypeError for another source.
+        A setting may be a mapping, as in an info. Raises UnknownSource, ValueError if the list is empty, SettingError
+        if it is no list or holds something else, and TypeError for another source.
         """
         self.source = open_source(reaches) if isinstance(reaches, str) else reaches
         if not hasattr(self.source, "sample") or not hasattr(self.source, "path"):

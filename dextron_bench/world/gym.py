@@ -27,9 +27,6 @@ from gymnasium.vector.utils import batch_space
 
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import infos, model
-from dextron_bench.world.engine import DIVERGED, STATE_BOUND, Engine
-from dextron_bench.world.environment import SettingQueue, validated_action
-from dextron_bench.world.pictures import Pictures
 from dextron_bench.world.arguments import (
     chosen_setting,
     reset_mask,
@@ -39,6 +36,9 @@ from dextron_bench.world.arguments import (
     slot_settings,
     step_limit,
 )
+from dextron_bench.world.engine import DIVERGED, STATE_BOUND, Engine
+from dextron_bench.world.environment import SettingQueue, validated_action
+from dextron_bench.world.pictures import Pictures
 
 RENDERING: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": round(1.0 / model.CONTROL_STEP)}
 
@@ -120,8 +120,8 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     """Plays many episodes in parallel on one engine: the same as many `GraspEnv`s, but much faster.
 
-    `autoreset_mode` has Gymnasium's meaning, and so has `max_episode_steps`, which truncates episodes. By default, the step after the last step of an episode begins the next
-    episode of that slot; it ignores the action, and its reward is 0.
+    `autoreset_mode` and `max_episode_steps` have Gymnasium's meaning. By default, the step after the last step of an
+    episode begins the next episode of that slot; it ignores the action, and its reward is 0.
     """
 
     metadata = RENDERING | {"autoreset_mode": AutoresetMode.NEXT_STEP}
