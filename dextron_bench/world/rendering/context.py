@@ -8,6 +8,7 @@ from contextlib import suppress
 from ctypes.util import find_library
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Protocol
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # The library of each off-screen backend, best first.
@@ -65,7 +66,8 @@ def _import_triton() -> None:
     """Imports Triton, if it works here, before the first context.
 
     Mesa and Triton each contain an LLVM. The optimizers of torch import Triton, which ends a process that has drawn
-    with Mesa in a segmentation fault; in the other order, both work.
+    with Mesa in a segmentation fault; in the other order, both work. If Mesa's LLVM is already here, it is too late.
     """
-    with suppress(Exception):
-        import_module("triton")
+    with suppress(Exception):  # Triton exists only where this file does.
+        if "libLLVM" not in Path("/proc/self/maps").read_text(encoding="utf-8"):
+            import_module("triton")
