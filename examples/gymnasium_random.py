@@ -16,7 +16,7 @@ def main(reaches: str = "minjerk", steps: int = 500) -> int:
         for slot in (terminated | truncated).nonzero()[0]:
             finished += 1
             ending = "the bottle fell" if terminated[slot] else "time was up"
-            print(f"{info['setting'][slot].reach}: return {info['episode_return'][slot]:.0f}, {ending}")
+            print(f"{info['setting']['reach'][slot]}: return {info['episode_return'][slot]:.0f}, {ending}")
     return finished
 
 

@@ -34,8 +34,8 @@ def rollout(
     the simulation, not what the agent saw and sent under a track.
 
     Raises AgentError if the agent raises an exception or returns actions of a wrong shape. An action that is not finite
-    or lies outside [-1, 1] fails its own episode only, and so does a simulation that diverges; AgentCrashed fails all
-    current episodes.
+    or lies outside [-1, 1] by more than `task.LEEWAY` fails its own episode only, and so does a simulation that
+    diverges; AgentCrashed fails all current episodes. A smaller excess is clipped.
     """
     engine = Engine(min(slots, max(len(cases), 1)), threads)
     return _Evaluation(agent, source, cases, engine, track, bottles).run()
@@ -70,12 +70,13 @@ class _Evaluation:
         self._refill(np.arange(self._engine.slots))
         while (live := np.flatnonzero(self._case >= 0)).size:
             try:
-                actions = self._ask()
+                asked = self._ask()
             except AgentCrashed as error:
                 yield from [self._episode(slot, failure=str(error)) for slot in live.tolist()]
                 self._refill(live)
                 continue
-            is_valid = np.abs(actions[live, 0]) <= 1.0  # False for NaN.
+            actions = task.clipped(asked)
+            is_valid = ~np.isnan(actions[live, 0])
             valid, invalid = live[is_valid], live[~is_valid]
             arriving = self._perturbation.delay(actions)[valid]
             step = self._engine.step(valid, arriving)
@@ -83,7 +84,7 @@ class _Evaluation:
             ended = np.flatnonzero(step.ended & ~step.diverged)
             yield from [self._episode(valid[i], bool(step.terminated[i]), bool(step.truncated[i])) for i in ended]
             yield from [self._episode(slot, failure=DIVERGED) for slot in valid[step.diverged]]
-            yield from [self._episode(slot, failure=describe_fault(actions[slot, 0])) for slot in invalid]
+            yield from [self._episode(slot, failure=describe_fault(asked[slot, 0])) for slot in invalid]
             self._refill(np.union1d(valid[step.ended], invalid))
 
     def _ask(self) -> np.ndarray:
@@ -142,4 +143,4 @@ class _Evaluation:
 
 def describe_fault(action: float) -> str:
     """Why an action is invalid."""
-    return f"action {action:g} is outside [-1, 1]" if np.isfinite(action) else f"action is {action}"
+    return f"action {float(action)!r} is outside [-1, 1]" if np.isfinite(action) else f"action is {action}"

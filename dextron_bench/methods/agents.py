@@ -26,7 +26,8 @@ class Agent(Protocol):
     def act(self, states: np.ndarray) -> np.ndarray:
         """Maps states (N, 48) to closing speeds (N, 1), floats in [-1, 1]; N is the same in every call.
 
-        NaN, or a speed outside [-1, 1], fails the episode of its row. Another shape or type ends the evaluation.
+        A speed up to 1e-6 outside is clipped. NaN, or a speed further outside, fails the episode of its row. Another
+        shape or type ends the evaluation.
         """
         ...
 

@@ -61,8 +61,8 @@ class Trainer(Protocol):
     def advance(self) -> list[dict[str, float]]:
         """Trains for one epoch; returns the epoch's metrics for each seed.
 
-        Values are finite; leave out a metric that is not known. `frames` is the total number of control steps that
-        the agent has acted in so far.
+        Values are finite numbers, or arrays and tensors of one element; leave out a metric that is not known. `frames`
+        is the total number of control steps that the agent has acted in so far. `epoch` and `seed` name no metrics.
         """
         ...
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -44,10 +44,17 @@ class Setting:
 
 
 def checked_setting(value: object) -> Setting:
-    """The value, if it is a setting; raises SettingError."""
+    """The value, if it is a setting, or the setting of a mapping with its fields; raises SettingError."""
+    if isinstance(value, Mapping) and set(value) == {field.name for field in fields(Setting)}:
+        return Setting(**value)
     if not isinstance(value, Setting):
         raise SettingError(f"a setting must be a dextron_bench Setting; got {value!r}")
     return value
+
+
+def plain(setting: Setting) -> dict[str, Any]:
+    """A setting as a dictionary of a text and Python floats, which `checked_setting` reads."""
+    return {name: value if isinstance(value, str) else float(value) for name, value in asdict(setting).items()}
 
 
 class UnknownReach(KeyError):

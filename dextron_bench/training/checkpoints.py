@@ -99,13 +99,16 @@ class Checkpoints:
         weights.
         """
         epoch = progress.epoch
-        tensors.write(self._journal(epoch), trainer.journal(), {"epoch": epoch})
+        with as_agent_error("journal(), weights() or state() of the trainer"):
+            journal, weights, state = trainer.journal(), list(trainer.weights()), trainer.state()
+        if (count := len(weights)) != len(self.seeds):
+            raise AgentError(f"weights() of the trainer must have one for each of {len(self.seeds)} seeds, not {count}")
+        tensors.write(self._journal(epoch), journal, {"epoch": epoch})
         frames = {row["seed"]: row.get("frames") for row in rows}
-        for seed, arrays in zip(self.seeds, trainer.weights(), strict=True):
+        for seed, arrays in zip(self.seeds, weights, strict=True):
             metadata = {**about, "seed": seed, "seeds": self.seeds, "epoch": epoch, "frames": frames.get(seed)}
             tensors.write(self.snapshot(epoch, seed), arrays, metadata)
         metric_rows.sync(self.folder)
-        state = trainer.state()
         written = [self._journal(epoch), *(self.snapshot(epoch, seed) for seed in self.seeds)]
         self._listed |= checkpoint_list.hashes(self.folder, written)
         metrics = {METRICS: hashing.digest(metric_rows.first(self.folder, self._rows(epoch)))}

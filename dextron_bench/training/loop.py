@@ -155,14 +155,15 @@ class _TrainingRun:
         number, start, seeds = trainer.epoch + 1, time.perf_counter(), self._checkpoints.seeds
         with as_agent_error(f"epoch {number} of method {self._learner.label!r}"):
             metrics = trainer.advance()
-        if trainer.epoch != number or len(metrics) != len(seeds):
+        count = len(metrics) if isinstance(metrics, Sequence) else repr(metrics)
+        if trainer.epoch != number or count != len(seeds):
             raise AgentError(
                 f"advance() of method {self._learner.label!r} must do one epoch and return a dictionary for each of "
-                f"{len(seeds)} seeds; it went from epoch {number - 1} to {trainer.epoch} with {len(metrics)}"
+                f"{len(seeds)} seeds; it went from epoch {number - 1} to {trainer.epoch} with {count}"
             )
         self._note_time("epoch", number, time.perf_counter() - start)
         rows = [
-            {"epoch": number, "seed": seed, **{name: float(value) for name, value in values.items()}}
+            {"epoch": number, "seed": seed, **metric_rows.numbers(values, self._learner.label)}
             for seed, values in zip(seeds, metrics, strict=True)
         ]
         for row in rows:

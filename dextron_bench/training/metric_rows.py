@@ -3,14 +3,36 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.methods.agents import AgentError
 from dextron_bench.storage import atomic, schemas
 from dextron_bench.storage.atomic import DamagedFile
 
 METRICS = "metrics.jsonl"  # In the folder of a training.
+KEYS = ("epoch", "seed")  # The names in a row that are no metrics.
+
+
+def numbers(metrics: Any, method: str) -> dict[str, float]:
+    """The metrics of an epoch and a seed, as a method returned them, with Python floats as values.
+
+    Arrays and tensors of one element count as numbers. Raises AgentError.
+    """
+    if not isinstance(metrics, Mapping):
+        raise AgentError(f"method {method!r} must return its metrics as a dictionary; got {metrics!r}")
+    if wrong := [name for name in metrics if not isinstance(name, str) or name in KEYS]:
+        raise AgentError(f"method {method!r} has a metric {wrong[0]!r}; a name is a text other than {', '.join(KEYS)}")
+    return {name: _number(value, name, method) for name, value in metrics.items()}
+
+
+def _number(value: Any, name: str, method: str) -> float:
+    try:
+        return float(value.item() if hasattr(value, "item") else value)
+    except Exception as error:  # Arrays and tensors of others have their own errors.
+        shown = " ".join(repr(value).split())
+        raise AgentError(f"metric {name!r} of method {method!r} must be one number; got {shown}") from error
 
 
 def append(folder: Path, rows: Sequence[dict[str, Any]]) -> None:

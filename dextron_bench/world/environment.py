@@ -2,34 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from dextron_bench.reaches.setting import Setting, Source, checked_setting
+from dextron_bench.reaches.setting import Setting, SettingError, Source, checked_setting
 from dextron_bench.reaches.sources import open_source
+from dextron_bench.world import task
 
 
 class ActionError(ValueError):
     """An invalid action; the message has its value and the valid ones."""
 
 
-def validated_action(actions: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """The actions as 64-bit floats of that shape. Raises ActionError.
+def validated_action(actions: np.ndarray, shape: tuple[int, ...], ignored: np.ndarray | None = None) -> np.ndarray:
+    """The actions as 64-bit floats of that shape, in [-1, 1] (see `task.clipped`). Raises ActionError.
 
-    It refuses other shapes, NaN, and every value outside [-1, 1]. It does not clip values, so an action means the same
-    in training, in evaluation and in a replay.
+    It refuses other shapes and types, NaN, and every value that lies outside the range by more than `task.LEEWAY`,
+    except in rows where `ignored` is true. So an action means the same in training, in evaluation and in a replay.
     """
     try:
-        values = np.asarray(actions, dtype=np.float64)
+        given = np.asarray(actions)
+        if given.dtype.kind not in "fiubO":  # NumPy would read texts as numbers, and drop imaginary parts.
+            raise TypeError
+        values = given.astype(np.float64)
     except (TypeError, ValueError):
         raise ActionError(f"actions must be numbers of shape {shape}; got {actions!r}") from None
     if values.shape != shape:
         raise ActionError(f"actions must have shape {shape}; got {values.shape}")
-    invalid = values[~((values >= -1.0) & (values <= 1.0))]  # This form also selects NaN.
+    clipped = task.clipped(values)
+    is_invalid = np.isnan(clipped)
+    if ignored is not None:
+        is_invalid[ignored] = False
+    invalid = values[is_invalid]
     if invalid.size:
-        raise ActionError(f"actions must lie in [-1, 1] and are not clipped; got {float(invalid[0])!r}")
-    return values
+        raise ActionError(f"actions must lie in [-1, 1]; got {float(invalid[0])!r}")
+    return clipped
+
+
+def _checked_settings(settings: object) -> list[Setting]:
+    if not isinstance(settings, Iterable) or isinstance(settings, str | Mapping):
+        raise SettingError(f"settings must be a list of settings; got {settings!r}")
+    checked = [checked_setting(setting) for setting in settings]
+    if not checked:
+        raise ValueError("settings is an empty list; pass at least one setting, or None to draw from the source")
+    return checked
 
 
 class SettingQueue:
@@ -38,12 +55,13 @@ class SettingQueue:
     def __init__(self, reaches: str | Source, settings: Sequence[Setting] | None = None) -> None:
         """Takes a source or its name.
 
-        Raises UnknownSource, ValueError if the list is empty, and SettingError if it holds something else.
+        A setting may be a mapping, as in an info. Raises UnknownSource, ValueError if the list is empty, SettingError
+        if it is no list or holds something else, and TypeError for another source.
         """
-        if settings is not None and not settings:
-            raise ValueError("settings is an empty list; pass at least one setting, or None to draw from the source")
         self.source = open_source(reaches) if isinstance(reaches, str) else reaches
-        self._settings = settings if settings is None else [checked_setting(setting) for setting in settings]
+        if not hasattr(self.source, "sample") or not hasattr(self.source, "path"):
+            raise TypeError(f"reaches must be a source of reaches or its name; got {reaches!r}")
+        self._settings = None if settings is None else _checked_settings(settings)
         self._position = 0
 
     def rewind(self) -> None:

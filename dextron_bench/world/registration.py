@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import gymnasium
 
+from dextron_bench.reaches.timing import STEP_LIMIT
+
 GRASP = "dextron_bench/Grasp-v0"
 
 
@@ -17,4 +19,5 @@ def register_environments() -> None:
         GRASP,
         entry_point="dextron_bench.world.gym:GraspEnv",
         vector_entry_point="dextron_bench.world.gym:GraspVectorEnv",
+        max_episode_steps=STEP_LIMIT + 1,  # At 500, TimeLimit would also truncate an episode that terminates there.
     )

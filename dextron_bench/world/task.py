@@ -11,15 +11,16 @@ import numpy as np
 
 from dextron_bench.reaches import rotation
 from dextron_bench.reaches.reach import PALM_CENTRE
+from dextron_bench.reaches.timing import STEP_LIMIT
 from dextron_bench.world import model
 
-STEP_LIMIT = 500  # Control steps in an episode: 10 s.
 LIFTED = 0.25  # [m] height of the bottle's centre from which a step is rewarded.
 FALLEN = 0.110  # [m] height of the bottle's centre below which the bottle counts as fallen.
 HAND_RAISED = 0.145  # [m] rise of the hand above its start that starts the countdown.
 COUNTDOWN = 20  # Control steps that can earn a reward, after the bottle or the hand has risen.
 HOLD = 20  # Control steps for which the hand holds the last pose of a reach.
 SUCCESS = 20.0  # Sum of rewards of a successful grasp.
+LEEWAY = 1e-6  # How far outside [-1, 1] an action may lie: wrappers and sums in 32 bits round that much.
 
 
 def palm_centre(states: np.ndarray) -> np.ndarray:
@@ -58,6 +59,14 @@ def is_lifted(states: np.ndarray) -> np.ndarray:
 def has_fallen(states: np.ndarray) -> np.ndarray:
     """True if the bottle has fallen, shape (N,)."""
     return bottle_height(states) < FALLEN
+
+
+def clipped(actions: np.ndarray) -> np.ndarray:
+    """Actions of any shape, clipped to [-1, 1]; NaN where one is not finite or outside by more than LEEWAY.
+
+    Every environment and `rollout` apply this rule to what an agent sends. It leaves actions in the range as they are.
+    """
+    return np.where(np.abs(actions) <= 1.0 + LEEWAY, np.clip(actions, -1.0, 1.0), np.nan)
 
 
 def commands(actions: np.ndarray) -> np.ndarray:

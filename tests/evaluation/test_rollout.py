@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.episodes import Episode, fingerprint
 from dextron_bench.evaluation.rollout import describe_fault, rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.methods.agents import AgentError
@@ -106,8 +106,17 @@ def test_a_fault_does_not_change_other_episodes():
 
 def test_a_fault_in_a_later_step_names_the_step():
     episode = play(Sends(lambda call: 0.0 if call < 3 else -2.0), CASES[:1])[0]
-    assert episode.failure == "action -2 is outside [-1, 1] at step 3"
+    assert episode.failure == "action -2.0 is outside [-1, 1] at step 3"
     assert len(episode.actions) == 3
+
+
+@pytest.mark.parametrize("value", [np.nextafter(1.0, 2.0), 1.0 + 1e-6, np.float32(1.0000001), -1.0 - 1e-6])
+def test_an_action_that_rounding_put_outside_the_range_is_clipped_and_stored_clipped(value):
+    """RescaleAction of Gymnasium ends at 1.0000000000000002 for a third of all ranges."""
+    clipped, expected = play(Sends(value), CASES[:1])[0], play(Sends(np.sign(value)), CASES[:1])[0]
+    assert clipped.failure == ""
+    assert set(clipped.actions.ravel()) == {np.sign(value)}
+    assert fingerprint(clipped) == fingerprint(expected)
 
 
 def test_actions_of_the_wrong_shape_end_the_evaluation():
@@ -134,4 +143,5 @@ def test_no_cases_give_no_episodes():
 
 def test_descriptions_of_faults():
     assert describe_fault(-1.01) == "action -1.01 is outside [-1, 1]"
+    assert describe_fault(np.float64(1.0000020001)) == "action 1.0000020001 is outside [-1, 1]"  # Not rounded to 1.
     assert describe_fault(-np.inf) == "action is -inf"

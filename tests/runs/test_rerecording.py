@@ -92,9 +92,9 @@ def test_the_reason_of_a_failed_agent_is_kept(tmp_path: Path):
     (tmp_path / "late.py").write_text(LATE)
     folder = play(tmp_path, method=f"{tmp_path / 'late.py'}:Late")
     table = selection.episodes([folder])
-    assert set(table["failure"]) == {"action 2 is outside [-1, 1] at step 7"}
+    assert set(table["failure"]) == {"action 2.0 is outside [-1, 1] at step 7"}
     (summary,) = rerecording.recording.summarise(rerecorded(folder, EpisodeFilter(split=("val",))))
-    assert summary.properties["failure"] == "action 2 is outside [-1, 1] at step 7"
+    assert summary.properties["failure"] == "action 2.0 is outside [-1, 1] at step 7"
     assert (summary.properties["method"], summary.properties["seed"]) == ("late", 2)
 
 

@@ -173,6 +173,16 @@ def test_a_trainer_that_raises_or_returns_too_little_is_an_agent_error(tmp_path:
     monkeypatch.setattr(ToyTrainer, "advance", lambda self: [])
     with pytest.raises(AgentError, match="for each of 2 seeds; it went from epoch 0 to 0 with 0"):
         train(tmp_path / "b")
+    monkeypatch.setattr(ToyTrainer, "advance", lambda self: None)
+    with pytest.raises(AgentError, match="for each of 2 seeds; it went from epoch 0 to 0 with None"):
+        train(tmp_path / "d")
+    monkeypatch.undo()
+    monkeypatch.setattr(ToyTrainer, "weights", lambda self: [{}])
+    with pytest.raises(AgentError, match="one for each of 2 seeds, not 1"):
+        train(tmp_path / "e")
+    monkeypatch.setattr(ToyTrainer, "state", lambda self: 1 / 0)
+    with pytest.raises(AgentError, match=r"state\(\) of the trainer raised ZeroDivisionError"):
+        train(tmp_path / "f")
     with pytest.raises(AgentError, match="a period of at least one; it has 5 and 0"):
         train(tmp_path / "c", Toy(preset="quick", every=0))
 

@@ -131,7 +131,7 @@ def test_settings_are_played_in_turn_again_and_again():
     assert settings == [*SETTINGS[:2], *SETTINGS[:2]]
 
 
-@pytest.mark.parametrize("action", [[np.nan], [1.0 + 1e-15], [-2.0], [0.0, 0.0], 0.5, ["close"]])
+@pytest.mark.parametrize("action", [[np.nan], [1.0 + 1.1e-6], [-2.0], [0.0, 0.0], 0.5, ["close"]])
 def test_a_bad_action_is_refused(env: control.Environment, action: object):
     env.reset()
     with pytest.raises(ActionError, match=r"actions must"):

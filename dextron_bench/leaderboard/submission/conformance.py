@@ -90,7 +90,7 @@ def _independence_check(launch: Launch, episodes: Sequence[Episode], limits: Lim
     with IsolatedAgent(launch, 0, limits) as agent:
         agent.reset(np.arange(len(order)))
         try:
-            repeated = np.stack([agent.act(batch[order]) for batch in states])
+            repeated = np.stack([np.clip(agent.act(batch[order]), -1.0, 1.0) for batch in states])
         except (AgentCrashed, AgentError) as error:
             return Check(what, MEND, f"with {len(order)} episodes instead of {len(episodes)}: {error}")
     worst = float(np.abs(repeated - actions[:, order]).max())

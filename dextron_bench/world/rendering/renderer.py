@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+import atexit
+import ctypes
 import os
-import warnings
-from ctypes.util import find_library
+import threading
+import weakref
 from dataclasses import dataclass
-from importlib import import_module
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
 from dextron_bench.world.rendering import visuals
+from dextron_bench.world.rendering.context import INSTALL, Context, NoGraphics, create_context, refuse_fork
 from dextron_bench.world.simulator import mujoco
 
-LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # The library of each off-screen backend, best first.
-INSTALL = (
-    "install EGL (Debian: apt install libegl1 libgl1-mesa-dri) or OSMesa (apt install libosmesa6), "
-    "and set MUJOCO_GL to egl or osmesa"
-)
 SUPERSAMPLING = 2  # Rendered pixels along each side of a pixel of the picture.
 LIGHT_RADIUS = 0.35  # [m] radius of the lamp that casts soft shadows.
 
@@ -42,10 +39,6 @@ CAMERAS = {
     "hand": Camera(200, -18, 0.36, (-0.03, -0.01, 0.275)),
     "hero": Camera(160, -17, 0.66, (-0.02, -0.05, 0.21)),
 }
-
-
-class NoGraphics(RuntimeError):
-    """Off-screen rendering is not possible; the message says what to install."""
 
 
 class UnknownCamera(KeyError):
@@ -77,7 +70,10 @@ def frames(
 
 
 class Renderer:
-    """Renders pictures of one size off screen. Use it in a `with` statement, which frees its memory at the end."""
+    """Renders pictures of one size off screen, in the thread that made it.
+
+    `close`, or the end of a `with` statement, frees its memory. Several may draw in turn.
+    """
 
     def __init__(self, width: int, height: int, supersampling: int = SUPERSAMPLING) -> None:
         """Takes the size of the pictures [pixels] and the supersampling along each side. Raises NoGraphics."""
@@ -85,9 +81,7 @@ class Renderer:
         self._size = width, height = width * supersampling, height * supersampling
         self._model = visuals.visual_model()
         self._data = mujoco.MjData(self._model)
-        with warnings.catch_warnings(action="ignore"):  # GLFW warns of the errors that are raised below.
-            self._context = create_context(width, height)
-            self._context.make_current()
+        self._context = create_context(width, height)
         try:
             self._graphics = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         except mujoco.FatalError as error:
@@ -96,16 +90,34 @@ class Renderer:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._graphics)
         self._scene = mujoco.MjvScene(self._model, maxgeom=1000)
         self._option = mujoco.MjvOption()
+        self._home = _here()
+        self._free = weakref.finalize(self, _free, self._home, self._context, self._graphics)
+        self._free.atexit = False  # It would come after the end of EGL, which Python ends in the reverse order.
+        atexit.register(self._free)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._graphics.free()
-        self._context.free()
+        self.close()
+
+    @property
+    def is_in_other_thread(self) -> bool:
+        """True in a thread that did not make it, and cannot draw with it."""
+        return self._home[1] != _here()[1]
+
+    def close(self) -> None:
+        """Frees the memory; it draws nothing more."""
+        self._free()
+        atexit.unregister(self._free)
 
     def render(self, state: np.ndarray, camera: Camera, lights: int = 1) -> np.ndarray:
-        """A picture (height, width, 3) uint8 of a state (48,), averaged over `lights` positions of the key light."""
+        """A picture (height, width, 3) uint8 of a state (48,), averaged over `lights` positions of the key light.
+
+        Raises NoGraphics in a process that was forked from the renderer's.
+        """
+        refuse_fork()
+        self._context.make_current()  # Another renderer may have drawn in between.
         self._data.qpos[:] = state[: self._model.nq]
         mujoco.mj_forward(self._model, self._data)
         key = self._model.light("key").id
@@ -133,30 +145,24 @@ class Renderer:
         return pixels
 
 
+def _here() -> tuple[int, int]:
+    """The process and the thread that run this."""
+    return os.getpid(), threading.get_ident()
+
+
+def _free(home: tuple[int, int], context: Context, graphics: mujoco.MjrContext) -> None:
+    """Frees the memory of a renderer of a process and thread."""
+    if home == _here():
+        context.make_current()
+        graphics.free()
+        context.free()
+        return
+    for mine in (context, graphics):  # Elsewhere, even their destructors would crash: they live to the end.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(mine))
+
+
 def _disc(n: int, radius: float) -> np.ndarray:
     """Points (n, 3) that cover a horizontal disc evenly; only the centre if n is 1."""
     i = np.arange(n)
     r, turn = radius * np.sqrt(i / n), i * np.pi * (3 - np.sqrt(5))
     return np.stack([r * np.cos(turn), r * np.sin(turn), np.zeros(n)], axis=1)
-
-
-class Context(Protocol):
-    """An OpenGL context."""
-
-    def make_current(self) -> None: ...
-    def free(self) -> None: ...
-
-
-def create_context(width: int, height: int) -> Context:
-    """Creates an OpenGL context with the backend that MUJOCO_GL names, or the first with an installed library.
-
-    Raises NoGraphics.
-    """
-    backend = os.environ.get("MUJOCO_GL", "").lower().strip()
-    backend = backend or next((name for name, library in LIBRARIES.items() if find_library(library)), "")
-    if backend not in (*LIBRARIES, "glfw"):
-        raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={backend!r}: {INSTALL}")
-    try:
-        return import_module(f"mujoco.{backend}").GLContext(width, height)
-    except Exception as error:  # Each library has its own errors.
-        raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={backend}: {error}; {INSTALL}") from error

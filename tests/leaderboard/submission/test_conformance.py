@@ -63,7 +63,7 @@ def test_actions_that_depend_on_other_rows_are_noted(tmp_path: Path):
 def test_a_failure_ends_the_checks(tmp_path: Path):
     results = check(tmp_path, "return np.full((len(states), 1), 2.0)")
     assert list(results) == ["it starts", "actions are finite, in [-1, 1], one per row"]
-    assert "3 episodes failed: action 2 is outside [-1, 1] at step 0" in list(results.values())[1].detail
+    assert "3 episodes failed: action 2.0 is outside [-1, 1] at step 0" in list(results.values())[1].detail
     (tmp_path / "mine.py").write_text("import nothing_of_that_name")
     (only,) = checks(prepare_launch(f"{tmp_path}/mine.py:Agent"))
     assert (only.what, only.verdict) == ("it starts", MEND)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dextron_bench.world import model
-from dextron_bench.world.rendering import renderer
+from dextron_bench.world.rendering import context, renderer
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_the_error_for_an_unknown_camera_lists_the_cameras(start: np.ndarray) ->
 
 def test_without_graphics_the_error_says_what_to_install(start: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MUJOCO_GL", raising=False)
-    monkeypatch.setattr(renderer, "find_library", lambda name: None)
+    monkeypatch.setattr(context, "find_library", lambda name: None)
     with pytest.raises(renderer.NoGraphics, match=r"libegl1 .*libosmesa6"):
         renderer.render(start)
     monkeypatch.setenv("MUJOCO_GL", "disabled")

@@ -1,7 +1,8 @@
-"""The arguments of a reset of the Gymnasium environments: seeds, settings, and the slots to reset."""
+"""The checked arguments of the Gymnasium environments: counts, seeds, settings, and the slots to reset."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from numbers import Integral
 from typing import Any
@@ -11,6 +12,22 @@ import numpy as np
 from dextron_bench.reaches.setting import Setting, checked_setting
 
 Options = Mapping[str, Any] | None
+
+
+def slot_count(slots: Any) -> int:
+    """A number of slots as a Python integer. Raises ValueError."""
+    if not isinstance(slots, Integral) or slots < 1:
+        raise ValueError(f"num_envs must be an integer of at least 1; got {slots!r}")
+    return int(slots)
+
+
+def step_limit(limit: Any) -> float:
+    """The steps after which an episode is truncated: infinite for None or -1, as in Gymnasium. Raises ValueError."""
+    if limit is None or limit == -1:
+        return math.inf
+    if not isinstance(limit, Integral) or limit < 1:
+        raise ValueError(f"max_episode_steps must be an integer of at least 1, -1 or None; got {limit!r}")
+    return int(limit)
 
 
 def seed_number(seed: Any) -> int | None:
