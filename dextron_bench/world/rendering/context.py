@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import warnings
-from contextlib import suppress
 from ctypes.util import find_library
-from functools import cache
 from importlib import import_module
-from pathlib import Path
 from typing import Protocol
+
+from dextron_bench.world.simulator import import_triton
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # The library of each off-screen backend, best first.
 INSTALL = (
@@ -40,7 +39,7 @@ def create_context(width: int, height: int) -> Context:
     backends = [named] if named else [name for name, library in LIBRARIES.items() if find_library(library)]
     if not backends or backends[0] not in (*LIBRARIES, "glfw"):
         raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={named!r}: {INSTALL}")
-    _import_triton()
+    import_triton()
     while True:
         backend = backends.pop(0)
         try:
@@ -72,15 +71,3 @@ def refuse_fork() -> None:
             "cannot draw in a process that was forked from one that has drawn, because the threads of its graphics "
             "driver are missing here; start it with the method 'spawn' or 'forkserver', or draw only after the fork"
         )
-
-
-@cache
-def _import_triton() -> None:
-    """Imports Triton, if it works here, before the first context.
-
-    Mesa and Triton each contain an LLVM. The optimizers of torch import Triton, which ends a process that has drawn
-    with Mesa in a segmentation fault; in the other order, both work. If Mesa's LLVM is already here, it is too late.
-    """
-    with suppress(Exception):  # Triton exists only where this file does.
-        if "libLLVM" not in Path("/proc/self/maps").read_text(encoding="utf-8"):
-            import_module("triton")

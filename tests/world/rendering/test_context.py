@@ -96,11 +96,9 @@ def test_triton_is_imported_before_mesas_llvm_and_may_fail(content: str, tmp_pat
     """Mesa's LLVM, then Triton's, which torch's optimizers load, ended a process in a segmentation fault."""
     (tmp_path / "triton.py").write_text(f"{LOADED}\n{content}\n")
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-    code = f"print('triton' in sys.modules, flush=True)\n{LOADED}\n" + "renderer.render(state, 64, 48)\n" * 2
-    triton, loaded, *imported = printed(code, PYTHONPATH=path).splitlines()
-    assert triton == "False"  # Nothing else imports it.
-    too_late = loaded == "True"  # With MUJOCO_GL=osmesa, the import of mujoco loads OSMesa.
-    assert imported == ([] if too_late else ["False", *(["imported"] if "print" in content else [])])
+    code = "renderer.render(state, 64, 48)\n" * 2
+    lines = printed(code, PYTHONPATH=path).splitlines()
+    assert lines == ["False", *(["imported"] if "print" in content else [])]  # Once, without LLVM.
 
 
 @pytest.mark.parametrize("error", [AttributeError("'NoneType' object has no attribute 'eglQueryString'"), OSError("x")])
