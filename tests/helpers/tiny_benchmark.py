@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
-import pytest
 
 from dextron_bench.reaches import sources
 from dextron_bench.splits import loading
@@ -29,17 +28,7 @@ ROWS = pd.DataFrame(
     [("val", *SOLVED[0]), ("test", *SOLVED[1]), ("test", *SOLVED[0]), ("unseen-reach", *SOLVED[0]), ("open", *FALLS)],
     columns=COLUMNS,
 )
-COMMAND = """
-import sys
-from pathlib import Path
-sys.path.insert(0, sys.argv.pop(1))
-import signal
-signal.signal(signal.SIGINT, signal.default_int_handler)
-from tests.helpers import tiny_benchmark
-tiny_benchmark.install(Path(sys.argv.pop(1)))
-from dextron_bench.cli.main import main
-sys.exit(main())
-"""
+COMMAND = Path(__file__).with_name("tiny_command.py")
 
 
 def write(folder: Path, rows: pd.DataFrame = ROWS) -> Path:
@@ -62,6 +51,8 @@ def install(folder: Path, put: Callable[[object, str, object], None] = setattr) 
 @contextmanager
 def working_folder(folder: Path, rows: pd.DataFrame = ROWS) -> Iterator[Path]:
     """Makes a folder the working folder, and replaces the shipped splits by `rows`, which it keeps in data/."""
+    import pytest  # Commands of the tiny benchmark work without it.
+
     try:
         with pytest.MonkeyPatch.context() as patch:
             install(write(folder / "data", rows), patch.setattr)
@@ -79,7 +70,7 @@ def forget() -> None:
 
 def start(folder: Path, *arguments: str | Path, **environment: str) -> subprocess.Popen[str]:
     """Starts the command line with the splits in a folder, in a new process."""
-    command = [sys.executable, "-c", COMMAND, str(Path(__file__).parents[2]), str(folder), *map(str, arguments)]
+    command = [sys.executable, str(COMMAND), str(folder), *map(str, arguments)]
     inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
     return subprocess.Popen(
         command, env={**inherited, **environment}, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE

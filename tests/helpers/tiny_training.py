@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from dextron_bench.experts.policies import Case
 from dextron_bench.methods.learners import Learner, Track
@@ -51,6 +50,8 @@ def install(folder: Path, put: Callable[[object, str, object], None]) -> None:
 @contextmanager
 def working_folder(folder: Path) -> Iterator[Path]:
     """Makes a folder the working folder of the tiny benchmark with training, which it keeps in data/."""
+    import pytest
+
     with tiny_benchmark.working_folder(folder), pytest.MonkeyPatch.context() as patch:
         install(write(folder / "data"), patch.setattr)
         yield folder
