@@ -19,11 +19,11 @@ from tests.recording.test_episode_file import PATH, PROPERTIES, SETTING, episode
 
 DEADLY = """
 import json, os, sys
-print("null", flush=True)
-for line in sys.stdin:
-    if "deadly" in line:
-        os.abort()
-    print(json.dumps({"applications": ["dextron-bench"], "properties": {"episode": %s}}), flush=True)
+def main():
+    for line in sys.stdin:
+        if "deadly" in line:
+            os.abort()
+        print(json.dumps({"applications": ["dextron-bench"], "properties": {"episode": %s}}), flush=True)
 """
 
 
@@ -76,7 +76,7 @@ def test_long_properties_do_not_reach_the_process_that_asks(whole: Path, tmp_pat
     """A file of a megabyte can hold a text that fills the memory."""
     file = tmp_path / "long.rrd"
     recording.write(file, episode(20), PATH, {**PROPERTIES, "note": "x" * 2**16})
-    assert damages([file, whole]) == ["is damaged (its properties have more than 65536 characters)", ""]
+    assert damages([file, whole]) == ["cannot be read (its properties have more than 65536 characters)", ""]
 
 
 def test_other_applications_other_versions_and_damage_have_different_messages(whole: Path, tmp_path: Path):
@@ -118,9 +118,9 @@ def test_a_file_that_aborts_its_reader_is_reported_and_the_other_files_are_read(
     shutil.copy(whole, deadly)
     monkeypatch.setattr(reader_process, "__file__", str(script))
     reported = damages([deadly, whole, deadly, deadly, whole, deadly])
-    message = "is damaged (the process that read it ended with code "
+    message = "cannot be read (the process that read it ended with code "
     assert [damage[: len(message)] for damage in reported] == [message * bad for bad in (1, 0, 1, 1, 0, 1)]
-    with pytest.raises(recording.BrokenRecording, match=r"deadly\.rrd: is damaged \(the process that read it ended"):
+    with pytest.raises(recording.BrokenRecording, match=r"deadly\.rrd: cannot be read \(the process that read it ended"):
         recording.read_safely(deadly)
 
 
@@ -146,7 +146,7 @@ def test_a_reader_that_does_not_start_is_an_error(whole: Path, tmp_path: Path, m
     script = tmp_path / "reader.py"
     script.write_text("raise SystemExit('no rerun here')")
     monkeypatch.setattr(reader_process, "__file__", str(script))
-    with pytest.raises(recording.ReaderError, match="recordings cannot be read: no rerun here"):
+    with pytest.raises(recording.ReaderError, match="recordings cannot be read: the process that reads files cannot start: no rerun here"):
         damages([whole])
 
 
