@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
+import struct
 import subprocess
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ import rerun as rr
 from dextron_bench import recording
 from dextron_bench.recording import reader_process
 from dextron_bench.recording.summaries import NEEDED
+from tests.helpers import many_processors
 from tests.recording.test_episode_file import PATH, PROPERTIES, SETTING, episode
 
 DEADLY = """
@@ -153,3 +156,24 @@ def test_a_reader_that_does_not_start_is_an_error(whole: Path, tmp_path: Path, m
 def test_no_files_start_no_reader(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(reader_process, "__file__", "nowhere")
     assert damages([]) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [64, 128])
+def test_recordings_are_read_on_a_machine_with_many_processors(whole: Path, tmp_path: Path, count: int):
+    """Rerun starts a thread for each processor, and reserves 70 MB for each thread."""
+    command = [sys.executable, "-m", "dextron_bench", "recordings", "list", str(whole), "--check", "--json"]
+    environment = many_processors.environment(tmp_path, count)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_recording_without_a_footer_of_a_version_that_writes_none_is_read(whole: Path, tmp_path: Path):
+    """Rerun 0.26 ends a file with no footer."""
+    file, content = tmp_path / "older.rrd", whole.read_bytes()
+    end = 12
+    while (header := struct.unpack_from("<QQ", content, end))[0]:  # Kind and length [bytes] of a message; 0 is the end.
+        end += 16 + header[1]
+    file.write_bytes(content[:4] + b"\0\x1a\2" + content[7:end] + b"\0" * 16)
+    assert damages([file]) == damages([file], whole=True) == [""]
+    assert np.array_equal(recording.read_safely(file).episode.states, recording.read(whole).episode.states)
