@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.storage import atomic, provenance, schemas
+from dextron_bench.storage import atomic, provenance, run_times, schemas
 from dextron_bench.storage.run_folder import RunFolder
 
 RUN_ADVICE = "remove it, or choose another folder with --runs"
@@ -23,13 +23,14 @@ def check(folder: Path, config: Mapping[str, Any]) -> None:
 
 
 def write_or_check(folder: Path, config: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> None:
-    """Writes config and provenance of a run if there is no config yet; raises the same errors as `check`.
+    """Writes config, provenance and begin of a run if there is no config yet; raises the same errors as `check`.
 
     `config` contains the hash of the physics. `defaults` belong to a method whose config has only the settings that
     differ from them. They are stored with it for readers, and never compared.
     """
     run = RunFolder(folder)
     if not run.config.exists():  # The config is written last: if it exists, the provenance exists too.
+        run_times.note_begin(run)
         atomic.write_json(run.provenance, provenance.collect(config["physics"]))
         atomic.write_json(run.config, {**config, "defaults": defaults} if defaults else config)
     _check(run.config, config, "run", RUN_ADVICE)

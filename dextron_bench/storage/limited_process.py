@@ -35,7 +35,7 @@ class NotStarted(RuntimeError):
 
     def __init__(self, errors: str) -> None:
         reason = " ".join(errors.split()[-WORDS:]) or "it took too long"
-        super().__init__(f"the process that reads files cannot start: {reason}{_advice()}")
+        super().__init__(f"the process that reads files cannot start: {reason}{memory_advice()}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +77,8 @@ def _outcome(output: bytes, errors: bytes, code: int | None) -> Outcome:
     return Outcome(output.removeprefix(READY), text, code)
 
 
-def _advice() -> str:
-    """What may help if this process, and with it those that it starts, has a limit on its address space."""
+def memory_advice() -> str:
+    """What may help if this process has a limit on its address space, empty if it has none."""
     limit = resource.getrlimit(resource.RLIMIT_AS)[0] if resource else -1
     if not resource or limit == resource.RLIM_INFINITY:
         return ""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-from datetime import UTC, datetime
+
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -43,6 +42,10 @@ def runs(tmp_path: Path) -> Path:
     points = [{"epoch": 10, "return": 3.0, "success": 0.1}, {"epoch": 20, "return": 2.0, "success": 0.2}]
     learner.curve.write_text(json.dumps({"split": "val", "points": points}))
     return tmp_path
+
+
+def ended(run: Path, moment: str) -> None:
+    (run / "times.json").write_text(json.dumps({"began": "2026-01-01T00:00:00+00:00", "ended": moment}))
 
 
 def names(entries: list[Entry]) -> list[str]:
@@ -87,8 +90,9 @@ def test_an_interrupted_run_did_not_fail(runs: Path):
 )
 def test_filters(runs: Path, chosen: dict, expected: list[str]):
     annotations.write(runs / "mine/real", annotations.Notes(("good",), "a note"))
-    old = datetime(2026, 2, 28, tzinfo=UTC).timestamp()
-    os.utime(runs / "mine-near0.06/real/seed0", (old, old))
+    ended(runs / "mine-near0.06/real/seed0", "2026-02-28T23:59:59+00:00")
+    ended(runs / "mine/real/seed1", "2026-03-01T00:00:00+00:00")
+    ended(runs / "learner/real/seed0", "2026-11-01T00:00:00+00:00")
     assert names([entry for entry in catalogue.entries(runs) if RunFilter(**chosen).passes(entry)]) == expected
 
 
@@ -104,8 +108,7 @@ def test_filters(runs: Path, chosen: dict, expected: list[str]):
 )
 def test_orders(runs: Path, order: str, split: str, expected: list[str]):
     for hour, label in enumerate(["mine", "learner", "mine-near0.06"]):
-        for folder in (runs / label / "real").iterdir():
-            os.utime(folder, (3600 * hour, 3600 * hour))
+        ended(runs / label / "real" / "seed0", f"2026-03-01T0{hour}:00:00+00:00")
     assert names(search.ordered(catalogue.entries(runs), order, split)) == expected
 
 
