@@ -26,7 +26,8 @@ class UnknownResult(LookupError):
 def write_result(folder: RunFolder, table: pd.DataFrame, about: dict[str, Any], seconds: float | None = None) -> None:
     """Writes the result of a run: the score of every episode, how episodes end, and what made them; notes its end.
 
-    A result that does not change leaves the end as it was. `seconds` of training belong to the provenance, since they differ each time.
+    A result that does not change leaves the end as it was. `seconds` of training belong to the provenance, since they
+    differ each time.
     """
     config = schemas.read(folder.config, schemas.CONFIG)
     made_by = schemas.read(folder.provenance, schemas.PROVENANCE)

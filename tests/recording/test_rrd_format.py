@@ -36,9 +36,15 @@ def test_bytes_four_to_six_are_the_version_and_only_files_since_0_28_have_a_foot
 
 def test_a_decoder_that_fails_proves_damage_only_for_its_own_version(tmp_path: Path):
     older = written(tmp_path / "a.rrd", b"RRF2\0\x16\1\0" + OPTIONS)
-    assert older.undecodable("why") == f"was written by Rerun 0.22.1, and Rerun {rrd_format.INSTALLED} cannot read it (why)"
+    assert (
+        older.undecodable("why")
+        == f"was written by Rerun 0.22.1, and Rerun {rrd_format.INSTALLED} cannot read it (why)"
+    )
     current = bytes([0, int(rrd_format.INSTALLED.partition(".")[2]), 7, 0])
-    assert written(tmp_path / "b.rrd", b"RRF2" + current + OPTIONS + b"FOOT\1\0\0\0").undecodable("why") == "is damaged (why)"
+    assert (
+        written(tmp_path / "b.rrd", b"RRF2" + current + OPTIONS + b"FOOT\1\0\0\0").undecodable("why")
+        == "is damaged (why)"
+    )
 
 
 def test_a_header_that_is_not_whole_is_named(tmp_path: Path):

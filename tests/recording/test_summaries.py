@@ -123,7 +123,9 @@ def test_a_file_that_aborts_its_reader_is_reported_and_the_other_files_are_read(
     reported = damages([deadly, whole, deadly, deadly, whole, deadly])
     message = "cannot be read (the process that read it ended with code "
     assert [damage[: len(message)] for damage in reported] == [message * bad for bad in (1, 0, 1, 1, 0, 1)]
-    with pytest.raises(recording.BrokenRecording, match=r"deadly\.rrd: cannot be read \(the process that read it ended"):
+    with pytest.raises(
+        recording.BrokenRecording, match=r"deadly\.rrd: cannot be read \(the process that read it ended"
+    ):
         recording.read_safely(deadly)
 
 
@@ -149,7 +151,10 @@ def test_a_reader_that_does_not_start_is_an_error(whole: Path, tmp_path: Path, m
     script = tmp_path / "reader.py"
     script.write_text("raise SystemExit('no rerun here')")
     monkeypatch.setattr(reader_process, "__file__", str(script))
-    with pytest.raises(recording.ReaderError, match="recordings cannot be read: the process that reads files cannot start: no rerun here"):
+    with pytest.raises(
+        recording.ReaderError,
+        match="recordings cannot be read: the process that reads files cannot start: no rerun here",
+    ):
         damages([whole])
 
 

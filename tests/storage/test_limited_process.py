@@ -18,7 +18,9 @@ def run(file: Path, code: str, *arguments: str, content: bytes = b"", seconds: f
 
 
 def test_a_script_receives_arguments_and_input(tmp_path: Path):
-    done = run(tmp_path / "a.py", "import sys\ndef main(*words): print(words, sys.stdin.read())", "x", "y z", content=b"in")
+    done = run(
+        tmp_path / "a.py", "import sys\ndef main(*words): print(words, sys.stdin.read())", "x", "y z", content=b"in"
+    )
     assert (done.output.split(b"\n")[0].strip(), done.code) == (b"('x', 'y z') in", 0)
 
 
@@ -46,7 +48,7 @@ def test_what_imports_reserve_does_not_count(tmp_path: Path):
 
 
 def test_a_script_that_cannot_be_imported_blames_no_file(tmp_path: Path):
-    with pytest.raises(limited_process.NotStarted, match="files cannot start: nothing here$"):
+    with pytest.raises(limited_process.NotStarted, match=r"files cannot start: nothing here$"):
         run(tmp_path / "a.py", "raise SystemExit('nothing here')")
 
 
