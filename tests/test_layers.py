@@ -47,6 +47,7 @@ SDKS = {  # Packages of others that one place alone imports.
     "tyro": "dextron_bench/cli/",
     "rich": "dextron_bench/cli/",
     "ray": "dextron_bench/cluster/ray_cluster.py",
+    "mlflow": "dextron_bench/runs/mlflow_export.py",
     "optuna": "dextron_bench/sweeps/optuna_search.py",
 }
 TOP = ("dextron_bench/__init__.py", "dextron_bench/__main__.py")  # Above all levels.

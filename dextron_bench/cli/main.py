@@ -19,6 +19,7 @@ from dextron_bench.cli import method_flags, places, usage
 from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.cli.output import print_warning
+from dextron_bench.storage.limited_process import memory_advice
 
 # The products of NumPy and of torch are small here: more threads would mostly wait for each other, above all on a busy
 # machine.
@@ -98,6 +99,8 @@ def explain(error: BaseException) -> tuple[int, str]:
         return USAGE, f"{reason}: {error.filename}" if error.filename else reason
     if isinstance(error, ModuleNotFoundError):
         return USAGE, f"{text}; `dextron-bench doctor` shows what is missing"
+    if isinstance(error, MemoryError) or (isinstance(error, ImportError) and "failed to map" in text):
+        return USAGE, f"there is too little memory ({text or 'no details'}){memory_advice()}"
     return BUG, f"unexpected {type(error).__name__}: {text}; --debug shows the traceback; please report it"
 
 

@@ -144,7 +144,7 @@ def _cell(entry: Entry, name: str, split: str) -> Any:
         **{"run": entry.name, "state": entry.state, "seeds": len(entry.seeds), "note": entry.note},
         **{"val": none_for_nan(entry.score("val")), "return": none_for_nan(entry.score(split))},
         "success": none_for_nan(entry.score(split, "success")),
-        **{"date": entry.changed.strftime("%Y-%m-%d %H:%M"), "tags": list(entry.tags), "physics": entry.physics[:8]},
+        **{"date": _date(entry), "tags": list(entry.tags), "physics": entry.physics[:8]},
     }
     if name.startswith(SETTINGS):
         return entry.settings.get(name.removeprefix(SETTINGS))
@@ -153,6 +153,11 @@ def _cell(entry: Entry, name: str, split: str) -> Any:
 
         raise search.BadSearch(f"no column {name!r}; choose from {', '.join(values)} and {SETTINGS}NAME")
     return values[name]
+
+
+def _date(entry: Entry) -> str | None:
+    """When a run last ended or began; None if its files do not say."""
+    return entry.changed.strftime("%Y-%m-%d %H:%M") if entry.changed else None
 
 
 def interval_text(entry: Entry, split: str, what: str) -> str | None:

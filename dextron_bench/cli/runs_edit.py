@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli.exit_codes import DONE
+from dextron_bench.cli.exit_codes import DIFFERS, DONE
+from dextron_bench.cli.output import print_warning
 
 if TYPE_CHECKING:
     from dextron_bench.runs.catalogue import Entry
@@ -131,26 +132,32 @@ class Remove:
 
 @dataclass(frozen=True)
 class Export:
-    """Write runs in MLflow's file format, with settings, scores and learning curves.
+    """Write runs into a database of MLflow, with settings, scores and learning curves. Needs the extra `mlflow`.
 
-    Example: dextron-bench runs export --into mlruns
+    A run that is not finished is written as it is. A line names each run whose files cannot be read, and the exit code
+    is 1; the others are written.
+
+    Example: dextron-bench runs export --into exported
     """
 
     into: Path
-    """The folder to write, new or empty; `MLFLOW_ALLOW_FILE_STORE=true mlflow ui --backend-store-uri FOLDER` opens it,
-    and `mlflow migrate-filestore` turns it into a database."""
+    """The folder to write, new or empty; `cd FOLDER && mlflow ui` shows it."""
     run: Annotated[tuple[str, ...], tyro.conf.arg(metavar="RUN")] = ()
     """The runs; all by default."""
     runs: Path = Path("runs")
     """Folder of all runs."""
 
     def __call__(self) -> int:
-        from dextron_bench.runs import catalogue, mlflow_files
+        from dextron_bench.runs import catalogue, exported_runs, mlflow_export
 
         entries = catalogue.entries(self.runs)
         chosen = [catalogue.find(entries, name) for name in self.run] if self.run else entries
-        print(f"{mlflow_files.write(chosen, self.into)} runs in {self.into}")
-        return DONE
+        exported, left_out = exported_runs.collect(chosen)
+        mlflow_export.write(exported, self.into)
+        print(f"{len(exported)} runs in {self.into / mlflow_export.DATABASE}")
+        for line in left_out:
+            print_warning(line)
+        return DIFFERS if left_out else DONE
 
 
 def _remove_if_empty(folder: Path) -> None:

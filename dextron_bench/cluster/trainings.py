@@ -57,7 +57,7 @@ class Training:
         """All files that it has written, in an order in which another folder may get them: what completes it last."""
         folder, runs = self.checkpoints.folder, [self.job.run_folder(seed) for seed in self.seeds]
         parts = [file for file in visible(folder, "**/*") if file.is_file() and file != folder / CHECKPOINT]
-        about = [file for run in runs for file in (run.config, run.provenance, run.curve)]
+        about = [file for run in runs for file in (run.config, run.provenance, run.times, run.curve)]
         files = [*parts, folder / CHECKPOINT, *about, *(run.weights for run in runs)]
         return [file for file in files if file.exists()]
 

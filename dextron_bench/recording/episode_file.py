@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import rerun as rr
-from rerun.chunk import Chunk, RrdReader
+from rerun.chunk import Chunk
 
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.phases import phases
 from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.reaches import reach
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.recording import blueprint, phase_lane, rrd_file, scene, success_plots
+from dextron_bench.recording import blueprint, phase_lane, rrd_file, rrd_format, scene, success_plots
 from dextron_bench.recording.digest import digest, lines
 from dextron_bench.recording.rrd_file import APPLICATION
 from dextron_bench.world import model
@@ -42,7 +42,7 @@ class Recording:
 
 
 class BrokenRecording(ValueError):
-    """A file is damaged, incomplete, or no recording of this project."""
+    """A file is damaged, incomplete, not readable here, or no recording of this project."""
 
     def __init__(self, file: Path, fault: str) -> None:
         super().__init__(f"{file}: {fault}")
@@ -134,17 +134,19 @@ def _values(properties: Mapping[str, Value]) -> dict[str, pa.Array]:
 
 def _load(file: Path, sha256: str | None) -> list[Chunk]:
     """All chunks of a whole file; raises BrokenRecording."""
-    if not file.is_file():
-        raise BrokenRecording(file, "there is no such file")
+    form = rrd_format.look_at(file)
+    if form.fault:
+        raise BrokenRecording(file, form.fault)
     if sha256 not in (None, hashlib.sha256(file.read_bytes()).hexdigest()):
         raise BrokenRecording(
             file, "does not have the SHA-256 that was stored for it; it was damaged or changed after writing"
         )
     try:
-        return RrdReader(file).store().stream().to_chunks()
+        return rrd_file.read_chunks(file, form)
+    except MemoryError as error:
+        raise BrokenRecording(file, "cannot be read (it needs too much memory)") from error
     except Exception as error:  # Rerun's readers raise errors of any type.
-        reason = str(error).splitlines()[0]
-        raise BrokenRecording(file, f"is cut short, damaged, or no .rrd file ({reason})") from error
+        raise BrokenRecording(file, form.undecodable(str(error).partition("\n")[0])) from error
 
 
 def _properties(chunks: Iterable[Chunk], name: str) -> dict[str, Value]:

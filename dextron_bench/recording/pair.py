@@ -7,9 +7,9 @@ from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
-from rerun.chunk import Chunk, RrdReader
+from rerun.chunk import Chunk
 
-from dextron_bench.recording import blueprint, phase_lane, rrd_file, scene
+from dextron_bench.recording import blueprint, phase_lane, rrd_file, rrd_format, scene
 from dextron_bench.recording.episode_file import Recording
 from dextron_bench.recording.summaries import PAIR, read_safely
 
@@ -55,7 +55,7 @@ def _name(recording: Recording) -> str:
 
 def _moved_chunks(file: Path, side: str) -> Iterable[Chunk]:
     """The visible chunks of a recording with entities below the side's root, without the styles of lines."""
-    for chunk in RrdReader(file).store().stream().to_chunks():
+    for chunk in rrd_file.read_chunks(file, rrd_format.look_at(file)):
         entity = str(chunk.entity_path)
         if not entity.startswith("/__") and not (chunk.is_static and entity in blueprint.LINES):
             yield chunk.with_entity_path(side + entity)

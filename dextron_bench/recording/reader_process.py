@@ -1,8 +1,8 @@
 """A script that prints the properties of recordings, one line of JSON for each file.
 
 It runs in a process of its own with limits, because a damaged file can abort the process that decodes it. It imports
-nothing of this package, so that it starts quickly. Each line of standard input is a file name in JSON. With the
-argument `whole` it decodes all of a file and not only the properties.
+nothing of this package, so that it starts quickly. Each line of standard input is JSON: the name of a file, and whether
+it has a footer. With the argument `whole` it decodes all of a file and not only the properties.
 """
 
 from __future__ import annotations
@@ -18,21 +18,23 @@ LONGEST = 2**16  # Characters of a line; whoever reads all lines of many files k
 TOO_LONG = f"its properties have more than {LONGEST} characters"
 
 
-def main() -> None:
-    """Prints `null` when it is ready, and then applications and properties of each file, or the error."""
-    print("null", flush=True)
-    for name in sys.stdin:
+def main(extent: str = "") -> None:
+    """Prints applications and properties of each file, or the `error` of the decoder, or the limit that it exceeds."""
+    for line in sys.stdin:
+        file, has_footer = json.loads(line)
         try:
-            description = _describe(json.loads(name), "whole" in sys.argv[1:])
+            description = _describe(file, has_footer, extent == "whole")
+        except MemoryError:
+            description = {"limit": "it needs too much memory"}
         except Exception as error:  # Rerun's readers raise errors of any type.
             description = {"error": " ".join(str(error).split())[:LONGEST]}
-        line = json.dumps(description)
-        print(line if len(line) <= LONGEST else json.dumps({"error": TOO_LONG}), flush=True)
+        answer = json.dumps(description)
+        print(answer if len(answer) <= LONGEST else json.dumps({"limit": TOO_LONG}), flush=True)
 
 
-def _describe(file: str, whole: bool) -> dict[str, Any]:
+def _describe(file: str, has_footer: bool, whole: bool) -> dict[str, Any]:
     reader, properties = RrdReader(file), {}
-    stream = reader.store().stream()
+    stream = (reader.store() if has_footer else reader).stream()
     for chunk in stream if whole else stream.filter(content=f"{PROPERTIES}**"):
         columns = chunk.to_record_batch()
         if chunk.entity_path.startswith(PROPERTIES):
@@ -40,7 +42,3 @@ def _describe(file: str, whole: bool) -> dict[str, Any]:
             cells = columns.to_pydict().items()
             group |= {name: cell[0][0] for name, cell in cells if not name.startswith("rerun.")}
     return {"applications": [entry.application_id for entry in reader.recordings()], "properties": properties}
-
-
-if __name__ == "__main__":
-    main()

@@ -1,8 +1,9 @@
-"""Writes Rerun's .rrd files atomically."""
+"""Writes Rerun's .rrd files atomically, and reads them."""
 
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.api import create_in_memory_blueprint
-from rerun.chunk import Chunk
+from rerun.chunk import Chunk, RrdReader
 from rerun_bindings import (
     PyMemorySinkStorage,
     flush_and_cleanup_orphaned_recordings,
@@ -18,6 +19,7 @@ from rerun_bindings import (
     send_blueprint,
 )
 
+from dextron_bench.recording.rrd_format import RrdFormat
 from dextron_bench.storage import atomic
 
 APPLICATION = "dextron-bench"  # Rerun's application id of recordings with predictions.
@@ -44,6 +46,13 @@ def save(
         reason = error.strerror if isinstance(error, OSError) else error
         raise UnwritableRecording(file, reason) from error
     return hashlib.sha256(content).hexdigest()
+
+
+def read_chunks(file: Path, form: RrdFormat) -> list[Chunk]:
+    """All chunks of a whole file of a format; raises errors of any type, as Rerun's readers do."""
+    with warnings.catch_warnings(action="ignore"):  # Rerun warns of each file without a footer.
+        reader = RrdReader(file)
+        return (reader.store() if form.has_footer else reader).stream().to_chunks()
 
 
 def _encoded(chunks: Iterable[Chunk], identity: str, blueprint: rrb.Blueprint, application: str) -> bytes:

@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.recording import reader_process
+from dextron_bench.recording import reader_process, rrd_format
 from dextron_bench.recording.episode_file import ENDS, BrokenRecording, Recording, Value, read
 from dextron_bench.recording.rrd_file import APPLICATION, APPLICATIONS
+from dextron_bench.recording.rrd_format import RrdFormat
 from dextron_bench.storage import limited_process
 
 NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Properties of every episode.
 PAIR = "pair"  # Property of a file with two episodes, which is only for the viewer.
-MAGIC, FOOT = b"RRF2", b"FOOT"  # An .rrd file starts with MAGIC and has FOOT before its last four bytes.
-MEMORY = 4 * limited_process.GIBIBYTE  # [bytes] of address space. With one flipped bit Rerun 0.41 asked for 23 GB.
-START, SECONDS = 60.0, 10.0  # [s] to start and for each file.
-HEAD = 12  # [bytes] size of an .rrd file's header.
+MEMORY = 2 * limited_process.GIBIBYTE  # [bytes] of address space. With one flipped bit Rerun 0.41 asked for 23 GB.
+START, SECONDS = 60.0, 10.0  # [s] for all files and for each file.
 
 
 class ReaderError(RuntimeError):
-    """The process that reads recordings cannot start."""
+    """The process that reads recordings cannot start; no recording is at fault."""
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Size [bytes] of a recording and the properties of its run and its episode, or its damage in words.
+    """Size [bytes] of a recording and the properties of its run and its episode, or in words why it cannot be read.
 
     A pair has one property, which names its two recordings.
     """
@@ -72,10 +70,11 @@ def read_screened(summary: Summary) -> Recording:
 
 def _summaries(files: Iterable[Path], whole: bool) -> Iterator[Summary]:
     files = list(files)
-    faults = [_format_fault(file) for file in files]
-    descriptions = _describe([file for file, fault in zip(files, faults, strict=True) if not fault], whole)
-    for file, fault in zip(files, faults, strict=True):
-        yield Summary(file, damage=fault) if fault else _summary(file, next(descriptions))
+    formats = [rrd_format.look_at(file) for file in files]
+    readable = [(file, form) for file, form in zip(files, formats, strict=True) if not form.fault]
+    descriptions = _describe(readable, whole)
+    for file, form in zip(files, formats, strict=True):
+        yield Summary(file, damage=form.fault) if form.fault else _summary(file, form, next(descriptions))
 
 
 def _verified(summary: Summary, sha256: str | None) -> Summary:
@@ -89,52 +88,35 @@ def _verified(summary: Summary, sha256: str | None) -> Summary:
     return summary
 
 
-def _format_fault(file: Path) -> str:
-    """The fault that a file's first and last bytes show; empty if it may be a recording."""
-    if not file.is_file():
-        return "is no file" if file.exists() else "there is no such file"
-    try:
-        with file.open("rb") as stream:
-            head = stream.read(HEAD)
-            stream.seek(-min(len(head), 8), os.SEEK_END)
-            tail = stream.read()
-    except OSError as error:
-        return f"cannot be read ({error.strerror})"
-    if not head:
-        return "is empty"
-    if head[:4] != MAGIC[: len(head)]:
-        is_rrd = head[:3] == MAGIC[:3]
-        return "is an .rrd file of another version of Rerun" if is_rrd else "is no .rrd file"
-    if tail[:4] != FOOT:
-        return "is cut short: it has no footer"
-    return ""
-
-
-def _describe(files: Sequence[Path], whole: bool) -> Iterator[dict[str, Any]]:
+def _describe(files: Sequence[tuple[Path, RrdFormat]], whole: bool) -> Iterator[dict[str, Any]]:
     """What the reader process prints for each file. If a file ends the process, a new one continues with the next."""
     while files:
-        names = "".join(json.dumps(str(file)) + "\n" for file in files).encode()
+        names = "".join(json.dumps([str(file), form.has_footer]) + "\n" for file, form in files).encode()
         seconds = START + SECONDS * len(files)
-        done = limited_process.run(reader_process.__file__, ["whole"] if whole else [], names, MEMORY, seconds)
+        try:
+            done = limited_process.run(reader_process.__file__, ["whole"] if whole else [], names, MEMORY, seconds)
+        except limited_process.NotStarted as error:
+            raise ReaderError(f"recordings cannot be read: {error}") from error
         *lines, _ = done.output.decode().split("\n")  # Without a line that the end of the process has cut.
-        if not lines:
-            raise ReaderError(f"recordings cannot be read: {' '.join(done.errors.split()[-30:])}")
-        yield from map(json.loads, lines[1:])
-        files = files[len(lines) - 1 :]
+        yield from map(json.loads, lines)
+        files = files[len(lines) :]
         if files:
-            yield {"error": f"the process that read it {done.ending}"}
+            yield {"limit": f"the process that read it {done.ending}"}
             files = files[1:]
 
 
-def _summary(file: Path, description: dict[str, Any]) -> Summary:
+def _summary(file: Path, form: RrdFormat, description: dict[str, Any]) -> Summary:
     """The summary of a file from what the reader process printed."""
+    if "limit" in description:  # Not proof of damage: the machine may lack memory, or be slow.
+        return Summary(file, damage=f"cannot be read ({description['limit']})")
     if "error" in description:
-        return Summary(file, damage=f"is damaged ({description['error'].rpartition(f'{file}: ')[2]})")
+        return Summary(file, damage=form.undecodable(description["error"].rpartition(f"{file}: ")[2]))
     applications, groups = description["applications"], description["properties"]
     others = [name for name in applications if name not in APPLICATIONS]
     if others or len(applications) != 1:
         content = ", ".join(others) or "several episodes"
-        return Summary(file, damage=f"is no recording of {APPLICATION}, but of {content}")
+        writer = "" if form.is_current else f", written by {form.writer}"
+        return Summary(file, damage=f"is no recording of {APPLICATION}, but of {content}{writer}")
     if PAIR in groups:
         return Summary(file, file.stat().st_size, {PAIR: " | ".join(map(str, groups[PAIR].values()))})
     properties = groups.get("run", {}) | groups.get("episode", {})

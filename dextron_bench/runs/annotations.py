@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage import atomic, run_times, schemas
 from dextron_bench.storage.run_folder import RunFolder
 
 NOTES = "notes.json"  # In the folder of a method's runs on one source of reaches.
@@ -66,6 +66,7 @@ def noting_failure(attempted: Sequence[RunFolder]) -> Iterator[None]:
                 continue
             with suppress(OSError):  # A full disk, for example, must not hide the error itself.
                 atomic.write_json(run.failure, {"error": f"{type(error).__name__}: {text}"})
+                run_times.note_end(run)
         raise
     for run in attempted:
         run.failure.unlink(missing_ok=True)

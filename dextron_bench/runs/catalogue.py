@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dextron_bench.runs import annotations, playing, result_files
-from dextron_bench.storage import schemas
+from dextron_bench.storage import run_times, schemas
 from dextron_bench.storage.run_folder import RunFolder, run_folders
+from dextron_bench.storage.run_times import RunTimes
 from dextron_bench.training import jobs
 from dextron_bench.world import task
 
@@ -30,7 +31,8 @@ class Entry:
     """All seeds of a method with its settings on one source of reaches.
 
     `scores` holds, by split, the scores (seeds, rows) of the seeds that have played it. `curves` holds, by seed, the
-    learning curve: points with `epoch`, and `return` and `success` on `val`. `state` says in words how far it is.
+    learning curve: points with `epoch`, and `return` and `success` on `val`. `state` says in words how far it is, and
+    `times` when each seed began and ended.
     """
 
     label: str
@@ -41,11 +43,17 @@ class Entry:
     code: Mapping[str, Any]
     physics: str
     state: str
-    changed: datetime
+    times: Mapping[int, RunTimes]
     scores: Mapping[str, np.ndarray] = field(default_factory=dict)
     curves: Mapping[int, Sequence[Mapping[str, float]]] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
     note: str = ""
+
+    @property
+    def changed(self) -> datetime | None:
+        """When a seed last ended, or began if it has not ended; None for runs of version 0.1, which do not say."""
+        known = [moment for times in self.times.values() if (moment := times.ended or times.began)]
+        return max(known, default=None)
 
     @property
     def name(self) -> str:
@@ -103,7 +111,7 @@ def _entry(
         config.get("code", {}),
         config.get("physics", ""),
         _state(members, left.get((label, reaches))),
-        datetime.fromtimestamp(max(run.path.stat().st_mtime for run in members), UTC),
+        {run.seed: run_times.read(run) for run in members},
         _scores(results),
         {run.seed: schemas.read(run.curve, schemas.CURVE)["points"] for run in members if run.curve.exists()},
         notes.tags,

@@ -11,7 +11,7 @@ import pandas as pd
 
 from dextron_bench.evaluation.episodes import action_hashes
 from dextron_bench.methods.registry import NAME
-from dextron_bench.storage import atomic, provenance, schemas
+from dextron_bench.storage import atomic, provenance, run_times, schemas
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import RunFolder, run_folders, seed_folders
 
@@ -24,16 +24,20 @@ class UnknownResult(LookupError):
 
 
 def write_result(folder: RunFolder, table: pd.DataFrame, about: dict[str, Any], seconds: float | None = None) -> None:
-    """Writes the result of a run: the score of every episode, how episodes end, and what made them.
+    """Writes the result of a run: the score of every episode, how episodes end, and what made them; notes its end.
 
-    `seconds` of training belong to the provenance, since they differ each time.
+    A result that does not change leaves the end as it was. `seconds` of training belong to the provenance, since they
+    differ each time.
     """
     config = schemas.read(folder.config, schemas.CONFIG)
     made_by = schemas.read(folder.provenance, schemas.PROVENANCE)
     made_by |= {} if seconds is None else {"seconds": seconds}
     maker = {name: config[name] for name in MAKER if name in config}
     result = {**about, "splits": scores_by_split(table), "provenance": made_by, "maker": maker}
+    before = folder.result.read_bytes() if folder.result.exists() else b""
     atomic.write_json(folder.result, result)
+    if folder.result.read_bytes() != before:
+        run_times.note_end(folder)
 
 
 def scores_by_split(table: pd.DataFrame) -> dict[str, Any]:

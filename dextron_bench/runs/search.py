@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 SCORES = ("return", "success")
 VAL = "val"  # Orders by the mean return on the split of this name, whatever the split is.
 ORDERS = ("name", "date", VAL, *SCORES)
+NEVER = datetime.min.replace(tzinfo=UTC)  # The date, in the order, of a run that says none.
 STATES = ("done", "training", "playing", "stopped", "unfinished", "failed")  # The first words of states.
 
 
@@ -35,7 +36,7 @@ class RunFilter:
     tag: tuple[str, ...] = ()
     """Tags that a run must have."""
     since: str = ""
-    """A date, such as 2026-01-31: only runs that changed since."""
+    """A date, such as 2026-01-31: only runs that ended, or began, since."""
     state: str = ""
     """The beginning of a state: done, training, playing, stopped, unfinished, failed."""
 
@@ -56,7 +57,7 @@ class RunFilter:
             and self.reaches in ("", entry.reaches)
             and all(name in entry.settings and _equal(entry.settings[name], value) for name, _, value in wanted)
             and set(self.tag) <= set(entry.tags)
-            and (not self.since or entry.changed >= _date(self.since))
+            and (not self.since or (entry.changed is not None and entry.changed >= _date(self.since)))
             and entry.state.startswith(self.state)
         )
 
@@ -70,7 +71,7 @@ def ordered(entries: Iterable[Entry], order: str, split: str) -> list[Entry]:
     if order == "name":
         return known
     if order == "date":
-        return sorted(known, key=lambda entry: entry.changed, reverse=True)
+        return sorted(known, key=lambda entry: entry.changed or NEVER, reverse=True)
     if order == VAL:
         return sorted(known, key=lambda entry: _last_if_nan(entry.score(VAL)))
     if order not in SCORES:

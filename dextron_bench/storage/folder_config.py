@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.storage import atomic, provenance, schemas
+from dextron_bench.storage import atomic, provenance, run_times, schemas
 from dextron_bench.storage.run_folder import RunFolder
 
 TRIES, PAUSE = 10, 0.1  # Looks at an empty config, and seconds between them; then it is damaged.
@@ -26,7 +26,7 @@ def check(folder: Path, config: Mapping[str, Any]) -> None:
 
 
 def write_or_check(folder: Path, config: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> None:
-    """Writes config and provenance of a run if there is no config yet; raises the same errors as `check`.
+    """Writes config, provenance and begin of a run if there is no config yet; raises the same errors as `check`.
 
     `config` contains the hash of the physics. `defaults` belong to a method whose config has only the settings that
     differ from them. They are stored with it for readers, and never compared. Of several processes that write at the
@@ -36,6 +36,7 @@ def write_or_check(folder: Path, config: Mapping[str, Any], defaults: Mapping[st
     is_new = _create(run.config, {**config, "defaults": defaults} if defaults else config)
     _check(run.config, config, "run", RUN_ADVICE)
     if is_new:
+        run_times.note_begin(run)
         atomic.write_json(run.provenance, provenance.collect(config["physics"]))
     elif not run.provenance.exists() and not run.episodes.exists():  # The writer of the config was killed, or is slow.
         with suppress(FileExistsError):

@@ -7,26 +7,35 @@ the process that decodes them.
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-GIBIBYTE = 2**30  # [bytes]
-SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
-START = """
-import runpy, sys
-kind, target, memory, *sys.argv[1:] = sys.argv[1:]
+from dextron_bench.storage import limited_start
+from dextron_bench.storage.limited_start import READY
+
 try:
     import resource
-    resource.setrlimit(resource.RLIMIT_AS, (int(memory), int(memory)))
-except (ImportError, OSError, ValueError):
-    pass
-if kind == "module":
-    runpy.run_module(target, run_name="__main__", alter_sys=True)
-else:
-    runpy.run_path(target, run_name="__main__")
-"""
+except ImportError:  # On Windows.
+    resource = None
+
+GIBIBYTE = 2**30  # [bytes]
+SINGLE_THREADED = {
+    **dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS"), "1"),
+    **{"ARROW_DEFAULT_MEMORY_POOL": "system", "MALLOC_ARENA_MAX": "2"},  # Arenas: 64 MiB reserved for each thread.
+}
+START = 600.0  # [s] in which a process must import what it needs, also from a slow disk.
+WORDS = 30  # The last words of the process's errors that a message has.
+
+
+class NotStarted(RuntimeError):
+    """A process that has ended before it could read anything: the machine lacks something, and no file is at fault."""
+
+    def __init__(self, errors: str) -> None:
+        reason = " ".join(errors.split()[-WORDS:]) or "it took too long"
+        super().__init__(f"the process that reads files cannot start: {reason}{memory_advice()}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,17 +53,33 @@ class Outcome:
 
 
 def run(target: str, arguments: Sequence[str], content: bytes, memory: int, seconds: float) -> Outcome:
-    """Runs a module, or a script if `target` ends in .py, with `content` on its standard input.
+    """Calls `main` of a module, or of a script if `target` ends in .py, with `content` on its standard input.
 
-    It may use `memory` [bytes] of address space, where the system supports that limit, and `seconds` of time.
+    It may use `memory` [bytes] of address space more than after its imports (Linux), and `seconds` of time. Raises
+    NotStarted if the imports fail.
     """
-    kind = "script" if target.endswith(".py") or "." not in target else "module"
-    command = [sys.executable, "-P", "-c", START, kind, target, str(memory), *arguments]
+    command = [sys.executable, "-P", limited_start.__file__, target, str(memory), str(seconds), *arguments]
     environment = {**os.environ, **SINGLE_THREADED}
     try:
         done = subprocess.run(
-            command, input=content, capture_output=True, timeout=seconds, env=environment, check=False
+            command, input=content, capture_output=True, timeout=START + seconds, env=environment, check=False
         )
     except subprocess.TimeoutExpired as error:
-        return Outcome(error.stdout or b"", (error.stderr or b"").decode(errors="replace"), None)
-    return Outcome(done.stdout, done.stderr.decode(errors="replace"), done.returncode)
+        return _outcome(error.stdout or b"", error.stderr or b"", None)
+    is_time_up = os.name == "posix" and done.returncode == -signal.SIGALRM
+    return _outcome(done.stdout, done.stderr, None if is_time_up else done.returncode)
+
+
+def _outcome(output: bytes, errors: bytes, code: int | None) -> Outcome:
+    text = errors.decode(errors="replace")
+    if not output.startswith(READY):
+        raise NotStarted(text)
+    return Outcome(output.removeprefix(READY), text, code)
+
+
+def memory_advice() -> str:
+    """What may help if this process has a limit on its address space, empty if it has none."""
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0] if resource else -1
+    if not resource or limit == resource.RLIM_INFINITY:
+        return ""
+    return f" (`ulimit -v` allows {limit / GIBIBYTE:.1f} GiB of address space; raise it)"

@@ -58,6 +58,11 @@ class RunFolder:
         return self.path / "provenance.json"
 
     @property
+    def times(self) -> Path:
+        """The file that says when the run began and ended."""
+        return self.path / "times.json"
+
+    @property
     def weights(self) -> Path:
         """The file of the weights that the agent acts with, if its method learns."""
         return self.path / "weights.safetensors"

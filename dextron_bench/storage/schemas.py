@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,17 @@ def flag(value: Any) -> None:
     """True or False."""
     if not isinstance(value, bool):
         raise Mismatch("is not true or false")
+
+
+def moment(value: Any) -> None:
+    """A date and a time with its zone, as ISO 8601 writes it."""
+    text(value)
+    try:
+        zone = datetime.fromisoformat(value).tzinfo
+    except ValueError:
+        zone = None
+    if zone is None:
+        raise Mismatch("is not a time with its zone, such as 2026-01-31T12:00:00+00:00")
 
 
 def number(low: float = -math.inf, high: float = math.inf) -> Schema:
@@ -190,6 +202,7 @@ PIECE = entries({"name": text, "depends on": OBJECT, "code": text, "files": map_
 FINDING = entries({"done": text, "problems": list_of(text), "actions": map_of(list_of(text))})
 NOTES = entries({"tags": list_of(text), "note": text})
 FAILURE = entries({"error": text})
+TIMES = entries({}, dict.fromkeys(("began", "ended"), moment))
 MANIFEST = entries({"name": text, "reaches": text, "seeds": list_of(COUNT, 1)}, {"declared": DECLARED})
 CHECKPOINT = entries({"epoch": COUNT, "epochs": COUNT, "device": text}, {"files": map_of(text)})
 SNAPSHOT = entries({"epoch": COUNT}, {"frames": or_none(AMOUNT)})

@@ -49,11 +49,13 @@ def sync(folder: Path) -> None:
 
 
 def read(folder: Path) -> list[dict[str, Any]]:
-    """All rows in order; raises DamagedFile."""
-    try:
-        rows = list(schemas.rows((folder / METRICS).read_bytes(), schemas.METRIC))
-    except OSError as error:
-        raise DamagedFile(folder, f"{METRICS}: {error}") from error
+    """All rows in order, none before the first epoch; raises DamagedFile.
+
+    The last line may not be whole, while a process writes it or after this process was killed. It is left out.
+    """
+    file = folder / METRICS
+    content = file.read_bytes() if file.exists() else b""
+    rows = list(schemas.rows(content[: content.rfind(b"\n") + 1], schemas.METRIC))
     if None in rows:
         raise DamagedFile(folder, f"{METRICS}: line {rows.index(None) + 1} does not hold the metrics of an epoch")
     return [row for row in rows if row]

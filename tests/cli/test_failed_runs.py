@@ -107,7 +107,12 @@ def test_a_full_disk_is_one_line_and_leaves_no_partial_file(
     monkeypatch.setattr(atomic, "write_atomically", full)
     line = complaint(*run("nothing"))
     assert "No space left on device: runs/nothing/synthetic/seed0/episodes.parquet" in line
-    assert sorted(os.listdir("runs/nothing/synthetic/seed0")) == ["config.json", "failure.json", "provenance.json"]
+    assert sorted(os.listdir("runs/nothing/synthetic/seed0")) == [
+        "config.json",
+        "failure.json",
+        "provenance.json",
+        "times.json",
+    ]
 
 
 def test_an_interrupted_run_is_code_130_and_continues_later(here: Path, capsys: pytest.CaptureFixture[str]):
@@ -121,6 +126,6 @@ def test_an_interrupted_run_is_code_130_and_continues_later(here: Path, capsys: 
     _, err = process.communicate(timeout=120)
     assert (process.returncode, err) == (130, "dextron-bench: interrupted\n")
     left = here / "runs" / "mine" / "synthetic" / "seed0"
-    assert sorted(os.listdir(left)) == ["config.json", "provenance.json"]
+    assert sorted(os.listdir(left)) == ["config.json", "provenance.json", "times.json"]
     assert main.main(words) == 0
     assert len(read_result(left / "result.json")["splits"]["test"]["scores"]) == 2

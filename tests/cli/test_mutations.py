@@ -121,7 +121,7 @@ KINDS = [  # The folder, the file in it, and the command that reads the file.
     ("recording", RECORDING, export),
 ]
 # Another plausible value in these files is not noticed here: nothing beside them repeats the values.
-UNPROTECTED = ("result.json", "curve.json", "provenance.json", "timing.jsonl")
+UNPROTECTED = ("result.json", "curve.json", "provenance.json", "timing.jsonl", "times.json")
 
 
 def mutated(content: bytes, name: str, rng: random.Random) -> bytes:

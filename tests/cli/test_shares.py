@@ -36,9 +36,13 @@ def on_machine(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files below a folder except recordings and their hashes, because the row ids of recordings are random."""
+    """All files below a folder except times, recordings and their hashes: row ids of recordings are random."""
     files = (file for file in folder.rglob("*") if file.is_file() and file.suffix != ".rrd")
-    return {str(file.relative_to(folder)): file.read_bytes() for file in files if file.name != "recordings.json"}
+    return {
+        str(file.relative_to(folder)): file.read_bytes()
+        for file in files
+        if file.name not in ("recordings.json", "times.json")
+    }
 
 
 def put_together(parts: list[Path], into: Path) -> None:

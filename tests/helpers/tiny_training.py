@@ -29,7 +29,7 @@ TOY = f"{Path(__file__).with_name('toy_learner.py')}:Toy"
 MINJERK_TOY, TRANSFER = TOY.replace(":Toy", ":MinjerkToy"), TOY.replace(":Toy", ":ToyTransfer")
 QUICK = Toy(preset="quick")  # 5 epochs, checkpoints after 2, 4 and 5.
 SEEDS = (0, 3)
-TIMES = {"timing.jsonl", "provenance.json"}  # Files that depend on time and machine.
+TIMES = {"timing.jsonl", "provenance.json", "times.json"}  # Files that depend on time and machine.
 
 
 def write(folder: Path) -> Path:

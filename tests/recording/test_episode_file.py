@@ -111,7 +111,7 @@ def test_one_flipped_byte_of_the_states_is_noticed(whole: Path, file: Path) -> N
 def test_a_recording_cut_anywhere_is_noticed(whole: Path, file: Path, share: float) -> None:
     content = whole.read_bytes()
     file.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(recording.BrokenRecording, match="is cut short, damaged, or no"):
+    with pytest.raises(recording.BrokenRecording, match=r"is empty|is no \.rrd file|is cut short"):
         recording.read(file)
 
 

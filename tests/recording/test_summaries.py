@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
+import struct
 import subprocess
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -15,15 +17,16 @@ import rerun as rr
 from dextron_bench import recording
 from dextron_bench.recording import reader_process
 from dextron_bench.recording.summaries import NEEDED
+from tests.helpers import many_processors
 from tests.recording.test_episode_file import PATH, PROPERTIES, SETTING, episode
 
 DEADLY = """
 import json, os, sys
-print("null", flush=True)
-for line in sys.stdin:
-    if "deadly" in line:
-        os.abort()
-    print(json.dumps({"applications": ["dextron-bench"], "properties": {"episode": %s}}), flush=True)
+def main():
+    for line in sys.stdin:
+        if "deadly" in line:
+            os.abort()
+        print(json.dumps({"applications": ["dextron-bench"], "properties": {"episode": %s}}), flush=True)
 """
 
 
@@ -76,7 +79,7 @@ def test_long_properties_do_not_reach_the_process_that_asks(whole: Path, tmp_pat
     """A file of a megabyte can hold a text that fills the memory."""
     file = tmp_path / "long.rrd"
     recording.write(file, episode(20), PATH, {**PROPERTIES, "note": "x" * 2**16})
-    assert damages([file, whole]) == ["is damaged (its properties have more than 65536 characters)", ""]
+    assert damages([file, whole]) == ["cannot be read (its properties have more than 65536 characters)", ""]
 
 
 def test_other_applications_other_versions_and_damage_have_different_messages(whole: Path, tmp_path: Path):
@@ -118,9 +121,11 @@ def test_a_file_that_aborts_its_reader_is_reported_and_the_other_files_are_read(
     shutil.copy(whole, deadly)
     monkeypatch.setattr(reader_process, "__file__", str(script))
     reported = damages([deadly, whole, deadly, deadly, whole, deadly])
-    message = "is damaged (the process that read it ended with code "
+    message = "cannot be read (the process that read it ended with code "
     assert [damage[: len(message)] for damage in reported] == [message * bad for bad in (1, 0, 1, 1, 0, 1)]
-    with pytest.raises(recording.BrokenRecording, match=r"deadly\.rrd: is damaged \(the process that read it ended"):
+    with pytest.raises(
+        recording.BrokenRecording, match=r"deadly\.rrd: cannot be read \(the process that read it ended"
+    ):
         recording.read_safely(deadly)
 
 
@@ -146,10 +151,34 @@ def test_a_reader_that_does_not_start_is_an_error(whole: Path, tmp_path: Path, m
     script = tmp_path / "reader.py"
     script.write_text("raise SystemExit('no rerun here')")
     monkeypatch.setattr(reader_process, "__file__", str(script))
-    with pytest.raises(recording.ReaderError, match="recordings cannot be read: no rerun here"):
+    with pytest.raises(
+        recording.ReaderError,
+        match="recordings cannot be read: the process that reads files cannot start: no rerun here",
+    ):
         damages([whole])
 
 
 def test_no_files_start_no_reader(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(reader_process, "__file__", "nowhere")
     assert damages([]) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [64, 128])
+def test_recordings_are_read_on_a_machine_with_many_processors(whole: Path, tmp_path: Path, count: int):
+    """Rerun starts a thread for each processor, and reserves 70 MB for each thread."""
+    command = [sys.executable, "-m", "dextron_bench", "recordings", "list", str(whole), "--check", "--json"]
+    environment = many_processors.environment(tmp_path, count)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_recording_without_a_footer_of_a_version_that_writes_none_is_read(whole: Path, tmp_path: Path):
+    """Rerun 0.26 ends a file with no footer."""
+    file, content = tmp_path / "older.rrd", whole.read_bytes()
+    end = 12
+    while (header := struct.unpack_from("<QQ", content, end))[0]:  # Kind and length [bytes] of a message; 0 is the end.
+        end += 16 + header[1]
+    file.write_bytes(content[:4] + b"\0\x1a\2" + content[7:end] + b"\0" * 16)
+    assert damages([file]) == damages([file], whole=True) == [""]
+    assert np.array_equal(recording.read_safely(file).episode.states, recording.read(whole).episode.states)

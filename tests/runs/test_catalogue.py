@@ -1,17 +1,14 @@
-"""The catalogue of runs: scores, states, filters and orders, and files for MLflow."""
+"""The catalogue of runs: scores, states, filters and orders."""
 
 from __future__ import annotations
 
 import json
-import os
-from datetime import UTC, datetime
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dextron_bench.runs import annotations, catalogue, mlflow_files, search
+from dextron_bench.runs import annotations, catalogue, search
 from dextron_bench.runs.catalogue import Entry
 from dextron_bench.runs.search import BadSearch, RunFilter
 from dextron_bench.storage.run_folder import RunFolder
@@ -43,6 +40,10 @@ def runs(tmp_path: Path) -> Path:
     points = [{"epoch": 10, "return": 3.0, "success": 0.1}, {"epoch": 20, "return": 2.0, "success": 0.2}]
     learner.curve.write_text(json.dumps({"split": "val", "points": points}))
     return tmp_path
+
+
+def ended(run: Path, moment: str) -> None:
+    (run / "times.json").write_text(json.dumps({"began": "2026-01-01T00:00:00+00:00", "ended": moment}))
 
 
 def names(entries: list[Entry]) -> list[str]:
@@ -87,8 +88,9 @@ def test_an_interrupted_run_did_not_fail(runs: Path):
 )
 def test_filters(runs: Path, chosen: dict, expected: list[str]):
     annotations.write(runs / "mine/real", annotations.Notes(("good",), "a note"))
-    old = datetime(2026, 2, 28, tzinfo=UTC).timestamp()
-    os.utime(runs / "mine-near0.06/real/seed0", (old, old))
+    ended(runs / "mine-near0.06/real/seed0", "2026-02-28T23:59:59+00:00")
+    ended(runs / "mine/real/seed1", "2026-03-01T00:00:00+00:00")
+    ended(runs / "learner/real/seed0", "2026-11-01T00:00:00+00:00")
     assert names([entry for entry in catalogue.entries(runs) if RunFilter(**chosen).passes(entry)]) == expected
 
 
@@ -104,8 +106,7 @@ def test_filters(runs: Path, chosen: dict, expected: list[str]):
 )
 def test_orders(runs: Path, order: str, split: str, expected: list[str]):
     for hour, label in enumerate(["mine", "learner", "mine-near0.06"]):
-        for folder in (runs / label / "real").iterdir():
-            os.utime(folder, (3600 * hour, 3600 * hour))
+        ended(runs / label / "real" / "seed0", f"2026-03-01T0{hour}:00:00+00:00")
     assert names(search.ordered(catalogue.entries(runs), order, split)) == expected
 
 
@@ -145,43 +146,3 @@ def test_a_name_that_no_run_or_several_have_is_refused(runs: Path):
 def test_bad_notes_are_refused(notes: dict):
     with pytest.raises(annotations.BadNote):
         annotations.Notes(**notes)
-
-
-@pytest.fixture
-def exported(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All runs as files for MLflow; the learner with the metrics of its training, in which another seed trained too."""
-    training = runs / "learner/real/training-0+1"
-    training.mkdir()
-    rows = [{"epoch": epoch, "seed": seed, "score": epoch + 0.5 - seed} for epoch in (1, 2) for seed in (0, 1)]
-    (training / "metrics.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    annotations.write(runs / "mine/real", annotations.Notes(("good",), "two\nlines"))
-    folder = tmp_path_factory.mktemp("exported") / "mlruns"
-    assert mlflow_files.write(catalogue.entries(runs), folder) == 4
-    return folder
-
-
-def test_files_for_mlflow_hold_settings_scores_and_curves(exported: Path, runs: Path):
-    texts = {
-        file.relative_to(exported).as_posix().split("/", 2)[-1]: file.read_text() for file in exported.rglob("*.*")
-    }
-    stamp = texts["metrics/val_curve.return"].split()[0]
-    assert texts["metrics/val_curve.return"] == f"{stamp} 3.0 10\n{stamp} 2.0 20\n"
-    assert texts["metrics/train.score"] == f"{stamp} 1.5 1\n{stamp} 2.5 2\n"
-    assert {(file.read_text()) for file in exported.rglob("params/near")} == {"0.08", "0.06"}
-    with pytest.raises(mlflow_files.NotEmpty):
-        mlflow_files.write(catalogue.entries(runs), exported)
-
-
-@pytest.mark.skipif(find_spec("mlflow") is None, reason="MLflow is not installed")
-def test_mlflow_loads_the_files(exported: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("MLFLOW_ALLOW_FILE_STORE", "true")  # Newer versions want a database by default.
-    from mlflow.tracking import MlflowClient  # type: ignore[import-not-found]
-
-    client = MlflowClient(exported.as_uri())
-    [experiment] = [one for one in client.search_experiments() if one.name == mlflow_files.NAME]
-    loaded = {run.info.run_name: run.data for run in client.search_runs([experiment.experiment_id])}
-    assert set(loaded) == {"mine/real/seed0", "mine/real/seed1", "mine-near0.06/real/seed0", "learner/real/seed0"}
-    mine = loaded["mine/real/seed0"]
-    assert (mine.params["near"], mine.metrics["test.return"], mine.metrics["test.success"]) == ("0.08", 15.0, 0.5)
-    assert mine.tags["good"] == "true"
-    assert mine.tags["mlflow.note.content"] == "two\nlines"

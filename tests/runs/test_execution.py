@@ -28,18 +28,19 @@ PLAN = Plan("exp", "synthetic", ("val", "test"), seed=0)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files except recordings, because their row ids are random."""
+    """All files except recordings, because their row ids are random, and the times of the run."""
     files = (file for file in folder.rglob("*") if file.is_file() and file.suffix != ".rrd")
-    return {str(file.relative_to(folder)): file.read_bytes() for file in files}
+    return {str(file.relative_to(folder)): file.read_bytes() for file in files if file.name != "times.json"}
 
 
 def test_a_second_execution_computes_nothing_and_changes_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     folder = execute(tmp_path, PLAN)
-    before = contents(folder)
+    before, times = contents(folder), (folder / "times.json").read_bytes()
     assert set(before) == {"config.json", "provenance.json", "episodes.parquet", "result.json"}
     monkeypatch.setattr(execution, "rollout", forbidden)
     assert execute(tmp_path, PLAN) == folder == tmp_path / "exp" / "synthetic" / "seed0"
     assert contents(folder) == before
+    assert (folder / "times.json").read_bytes() == times
 
 
 def test_a_run_killed_between_splits_ends_with_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -23,7 +23,3 @@ def main(schema: str, file: str) -> int:
         print(ascii(f"{file} is not valid JSON ({error})"))
         return 1
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))

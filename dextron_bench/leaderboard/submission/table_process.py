@@ -103,6 +103,7 @@ def _check_size(metadata: pq.FileMetaData, limits: dict[str, Any]) -> None:
 
 def main(file: str, limits: str) -> int:
     """Writes the table to standard output, or prints the fault; returns the exit code."""
+    pa.set_cpu_count(1)
     try:
         table = read(Path(file), json.loads(limits))
     except BadTable as error:
@@ -111,8 +112,3 @@ def main(file: str, limits: str) -> int:
     with pa.ipc.new_stream(sys.stdout.buffer, table.schema) as stream:
         stream.write_table(table)
     return 0
-
-
-if __name__ == "__main__":
-    pa.set_cpu_count(1)
-    sys.exit(main(*sys.argv[1:]))

@@ -30,7 +30,11 @@ SYSTEM_LIBRARIES = ("/usr/lib", "/usr/local/lib")  # Where other interpreters ha
 SECRET = ("splits", "experts", "real", "synthetic", "results")
 LARGEST_FILE = 256 * 2**20  # [bytes] of a file that an agent may write; its stderr is one such file.
 NAMESPACES = ("--unshare-all", "--cap-drop", "ALL", "--unshare-user", "--disable-userns")  # Last two: bubblewrap 0.8.
-LIMITS = 'ulimit -c 0; ulimit -n 512; ulimit -d "$1" && ulimit -f "$2" && shift 2 && exec "$@"'
+# A limit of the user that is lower stays: nobody may raise it, and the shell would end.
+LIMITS = """
+limit() { hard=$(ulimit -H "$1"); { [ "$hard" != unlimited ] && [ "$hard" -le "$2" ]; } || ulimit "$1" "$2"; }
+ulimit -c 0; limit -n 512; limit -d "$1" && limit -f "$2" && shift 2 && exec "$@"
+"""
 
 
 def wrap(

@@ -66,7 +66,7 @@ def test_a_long_text_is_refused(forged: Forgery):
 def test_a_footer_with_a_false_count_fills_no_memory(forged: Forgery, monkeypatch: pytest.MonkeyPatch):
     """A reader that asks for 3 GB ends; the footer of a real table makes it do so with a few bytes."""
     script = forged.seed / "hungry.py"
-    script.write_text("b'x' * (3 << 30)")
+    script.write_text("def main(*_): b'x' * (3 << 30)")
     monkeypatch.setattr(table_process, "__file__", str(script))
     with pytest.raises(BadBundle, match="cannot be read as a table"):
         episode_tables.read(forged.seed / "episodes.parquet", [])
@@ -74,7 +74,7 @@ def test_a_footer_with_a_false_count_fills_no_memory(forged: Forgery, monkeypatc
 
 def test_a_table_that_takes_too_long_is_refused(forged: Forgery, monkeypatch: pytest.MonkeyPatch):
     script = forged.seed / "slow.py"
-    script.write_text("while True: pass")
+    script.write_text("def main(*_):\n  while True: pass")
     monkeypatch.setattr(table_process, "__file__", str(script))
     monkeypatch.setattr(episode_tables, "SECONDS", 0.5)
     with pytest.raises(BadBundle, match="the process that read it took too long"):

@@ -1,0 +1,42 @@
+"""When a run began and when it ended, in a file of its own: all other files are equal if a run is repeated.
+
+The times of the files themselves are those of the last copy. Runs of version 0.1 do not have the file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage.run_folder import RunFolder
+
+
+@dataclass(frozen=True, slots=True)
+class RunTimes:
+    """When a run began, and when its result was written or it failed; None where this is not known."""
+
+    began: datetime | None = None
+    ended: datetime | None = None
+
+
+def read(run: RunFolder) -> RunTimes:
+    """The times of a run; raises DamagedFile."""
+    content = schemas.read(run.times, schemas.TIMES) if run.times.exists() else {}
+    return RunTimes(**{name: datetime.fromisoformat(content[name]) for name in ("began", "ended") if name in content})
+
+
+def note_begin(run: RunFolder) -> None:
+    """Notes that a run begins, unless it has begun before."""
+    if not run.times.exists():
+        atomic.write_json(run.times, {"began": _now()})
+
+
+def note_end(run: RunFolder) -> None:
+    """Notes that a run has ended, in the place of an earlier end; raises DamagedFile."""
+    content = schemas.read(run.times, schemas.TIMES) if run.times.exists() else {}
+    atomic.write_json(run.times, {**content, "ended": _now()})
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
