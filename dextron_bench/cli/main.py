@@ -19,6 +19,7 @@ from dextron_bench.cli import method_flags, usage
 from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.cli.output import print_warning
+from dextron_bench.storage import programs
 
 # The products of NumPy and of torch are small here: more threads would mostly wait for each other, above all on a busy
 # machine.
@@ -33,6 +34,7 @@ traceback."""
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; `arguments` default to `sys.argv`."""
+    programs.keep_to_installed_code()
     _limit_threads()
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words or bool(os.environ.get("DEXTRON_DEBUG"))

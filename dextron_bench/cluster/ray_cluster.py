@@ -9,8 +9,9 @@ import pickle
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, redirect_stdout
+from contextlib import ExitStack, chdir, contextmanager, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any
 
@@ -68,7 +69,9 @@ class RayCluster:
         self._ray = importlib.import_module("ray")
         with ExitStack() as quiet:
             quiet.enter_context(_without_messages())
-            self._connect()
+            empty = quiet.enter_context(TemporaryDirectory(prefix="dextron-ray-", ignore_cleanup_errors=True))
+            with chdir(empty):  # Ray's workers search the working folder for modules, before all others.
+                self._connect()
             self._quiet = quiet.pop_all()
         self._perform = self._ray.remote(PERFORM)
         self._inputs = inputs.References(self._ray.put)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+from dextron_bench.storage import programs
 
 GIBIBYTE = 2**30  # [bytes]
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
@@ -49,7 +50,7 @@ def run(target: str, arguments: Sequence[str], content: bytes, memory: int, seco
     It may use `memory` [bytes] of address space, where the system supports that limit, and `seconds` of time.
     """
     kind = "script" if target.endswith(".py") or "." not in target else "module"
-    command = [sys.executable, "-P", "-c", START, kind, target, str(memory), *arguments]
+    command = programs.python("-c", START, kind, target, str(memory), *arguments)
     environment = {**os.environ, **SINGLE_THREADED}
     try:
         done = subprocess.run(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import fields
 from importlib.metadata import EntryPoint, EntryPoints
@@ -219,3 +220,18 @@ def test_equal_seeds_act_equally_and_other_seeds_do_not():
     first, again, other = (Random().agent(seed).act(states) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert (first != other).any()
+
+
+def test_a_module_is_found_in_the_working_folder_but_replaces_none_that_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", list(sys.path))
+    (tmp_path / "my_agents").mkdir()
+    (tmp_path / "my_agents" / "near.py").write_text("class Near:\n    name = 'near'\n    def agent(self, seed): ...\n")
+    for name in ("scipy", "colorsys"):
+        (tmp_path / f"{name}.py").write_text("raise ImportError('planted')\n")
+    assert registry.find_method("my_agents.near:Near").name == "near"
+    assert sys.path[-1] == str(tmp_path)
+    with pytest.raises(UnknownMethod, match="colorsys has no class 'Agent'"):
+        registry.find_method("colorsys:Agent")
