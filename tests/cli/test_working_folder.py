@@ -20,10 +20,10 @@ NAMES = {*sys.stdlib_module_names, *packages_distributions(), "sitecustomize", "
 MORE = {  # Words with which a command starts processes, or reads what lies in the working folder.
     "view": (["one.rrd", "--web", "--port", "0"], ["--live", "one.rrd"]),
     "run": (
-        [*"--method rlil --preset smoke --reaches synthetic --split val --no-floors --tracker tensorboard".split()],
-        [*"--method nothing --reaches synthetic --split val --no-floors --record 2".split()],
+        ["--method", "rlil", "--preset", "smoke", "--split", "val", "--no-floors", "--tracker", "tensorboard"],
+        ["--method", "nothing", "--split", "val", "--no-floors", "--record", "2"],
     ),
-    "eval": ([*"--policies nosuch --quiet".split()],),
+    "eval": (["--policies", "nosuch", "--quiet"],),
     "check": (["mine.py:Mine"],),
     "rebuild": (["--list"],),
     "leaderboard": (["build"], ["serve", "--port", "0"]),

@@ -29,8 +29,8 @@ class NoSandbox(AgentError):
 class Launch:
     """How to start an agent's process: by its own command, or, if `command` is empty, by the Python worker.
 
-    `spec` has absolute paths; `folder` has the package of a module. `readable` are the files and folders that the process may read beside Python's own.
-    Code that is not `trusted` starts in the sandbox or not at all.
+    `spec` has absolute paths; `folder` has the package of a module. `readable` are the files and folders that the
+    process may read beside Python's own. Code that is not `trusted` starts in the sandbox or not at all.
     """
 
     spec: AgentSpec
