@@ -26,6 +26,7 @@ from dextron_bench.storage import programs
 # machine.
 THREADS = {"OPENBLAS_NUM_THREADS": "blas", "OMP_NUM_THREADS": "openmp"}
 PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
+LOOP = "Symlink loop"  # How `Path.resolve` begins to say so, before Python 3.13.
 DESCRIPTION = """Grasping with a prosthetic hand that a person moves: a benchmark.
 
 Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or input, 3 the agent raised errors in some
@@ -117,6 +118,8 @@ def explain(error: BaseException) -> tuple[int, str]:
         return USAGE, text
     if isinstance(error, UnicodeEncodeError):  # Of a name on the disk: streams write what they lack as escapes.
         return USAGE, name_fault(_word_at(error.object, error.start))
+    if isinstance(error, RuntimeError) and text.startswith(LOOP):
+        return USAGE, text
     if isinstance(error, OSError):
         reason = error.strerror or text
         return USAGE, f"{reason}: {error.filename}" if error.filename else reason
