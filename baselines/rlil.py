@@ -30,7 +30,7 @@ class Rlil(Rl):
     @property
     def method_stem(self) -> str:
         """The name with the demo-use ratio, such as "rlil-0.1"."""
-        return f"{self.name}-{self.dur:g}"
+        return f"{self.name}-{str(self.dur).removesuffix('.0')}"
 
     @property
     def demonstrated(self) -> int:

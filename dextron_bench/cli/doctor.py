@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from dextron_bench.cli.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.output import print_json, print_table
+from dextron_bench.storage import programs
 
 
 @dataclass(frozen=True)
@@ -114,11 +115,11 @@ def _renderer(name: str) -> Finding:
     environment = {**os.environ, "MUJOCO_GL": name}
     try:
         process = subprocess.run(
-            [sys.executable, "-c", RENDER], env=environment, capture_output=True, text=True, timeout=TIMEOUT
+            programs.python("-c", RENDER), env=environment, capture_output=True, timeout=TIMEOUT, check=False
         )
     except subprocess.TimeoutExpired:
         return Finding(f"MUJOCO_GL={name}", False, False, f"no answer in {TIMEOUT:.0f} s")
-    lines = process.stderr.strip().splitlines()
+    lines = process.stderr.decode(errors="replace").strip().splitlines()
     detail = "renders" if process.returncode == 0 else (lines[-1] if lines else f"exit code {process.returncode}")
     return Finding(f"MUJOCO_GL={name}", process.returncode == 0, False, detail)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import io
 import os
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr
@@ -15,16 +16,18 @@ from typing import Annotated, Any, Union
 
 import tyro
 
-from dextron_bench.cli import method_flags, places, usage
+from dextron_bench.cli import method_flags, places, streams, usage
 from dextron_bench.cli.commands import COMMANDS, Command, Group
 from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.cli.output import print_warning
+from dextron_bench.storage import programs
 from dextron_bench.storage.limited_process import memory_advice
 
 # The products of NumPy and of torch are small here: more threads would mostly wait for each other, above all on a busy
 # machine.
 THREADS = {"OPENBLAS_NUM_THREADS": "blas", "OMP_NUM_THREADS": "openmp"}
 PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
+LOOP = "Symlink loop"  # How `Path.resolve` begins to say so, before Python 3.13.
 DESCRIPTION = """Grasping with a prosthetic hand that a person moves: a benchmark.
 
 Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or input, 3 the agent raised errors in some
@@ -34,24 +37,21 @@ traceback."""
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; `arguments` default to `sys.argv`."""
+    programs.keep_to_installed_code()
     _limit_threads()
+    streams.prepare()
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words or bool(os.environ.get("DEXTRON_DEBUG"))
     words = [word for word in words if word != "--debug"]
-    if words == ["--version"]:
-        return _print_version()
-    if broken := [word for word in words if not _is_utf8(word)]:
-        print(f"dextron-bench: {broken[0]!a} is not valid UTF-8; rename the file or folder", file=sys.stderr)
-        return USAGE
     command = None
     try:
-        command = _parse(words)
-        usage.check_numbers(command)
-        code = command()
-        sys.stdout.flush()
-        return code
+        with streams.only_json(words):
+            try:
+                command = _parsed(words)
+                return command()
+            finally:
+                sys.stdout.flush()
     except BrokenPipeError:  # The reader of the results has stopped, as `| head` does.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
     except (KeyboardInterrupt, Exception) as error:
         if debug:
@@ -59,6 +59,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code, message = explain(error)
         print_warning(message + places.advice(error, command))
         return code
+    finally:
+        streams.give_up_output()
+
+
+def _parsed(words: Sequence[str]) -> Command:
+    """The command that the words select, with checked numbers."""
+    if broken := [word for word in words if not _is_utf8(word)]:
+        raise usage.BadName(name_fault(broken[0]))
+    if list(words) == ["--version"]:
+        return _print_version
+    command = _parse(words)
+    usage.check_numbers(command)
+    return command
 
 
 def _limit_threads() -> None:
@@ -85,6 +98,20 @@ def _is_utf8(text: str) -> bool:
     return True
 
 
+def name_fault(name: str) -> str:
+    """Why the name of a file, or another argument, cannot be used: it is no UTF-8, or the locale is not."""
+    try:
+        name.encode(errors="surrogateescape").decode()
+    except UnicodeError:
+        return f"{name!a} is not valid UTF-8; rename the file or folder"
+    return f"{name!a} has letters that this locale lacks; set LC_ALL=C.UTF-8, or PYTHONUTF8=1"
+
+
+def _word_at(text: str, place: int) -> str:
+    """The word of a text at a place: the name of a file, without the text around it."""
+    return next(match[0] for match in re.finditer(r'[^\s"]+', text) if match.end() > place)
+
+
 def explain(error: BaseException) -> tuple[int, str]:
     """The exit code and the line on stderr for an error that ended a command."""
     text = " ".join(str(error.args[0] if isinstance(error, KeyError) and error.args else error).split())
@@ -92,8 +119,10 @@ def explain(error: BaseException) -> tuple[int, str]:
         return INTERRUPTED, "interrupted"
     if type(error).__module__.split(".")[0] in PACKAGES:
         return USAGE, text
-    if isinstance(error, UnicodeEncodeError):  # Of a name on the disk; arguments are checked before.
-        return USAGE, f"{error.object!a} is not valid UTF-8; rename the file or folder"
+    if isinstance(error, UnicodeEncodeError):  # Of a name on the disk: streams write what they lack as escapes.
+        return USAGE, name_fault(_word_at(error.object, error.start))
+    if isinstance(error, RuntimeError) and text.startswith(LOOP):
+        return USAGE, text
     if isinstance(error, OSError):
         reason = error.strerror or text
         return USAGE, f"{reason}: {error.filename}" if error.filename else reason

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
+import math
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from dextron_bench.cli.streams import json_output
 from dextron_bench.storage.printable import printable, printable_line
 from dextron_bench.storage.progress import Progress, no_progress
 
@@ -30,7 +33,9 @@ def print_table(
     from rich.console import Console
 
     rows = [list(row) for row in rows]
-    console = Console(width=None if sys.stdout.isatty() else WIDTH, soft_wrap=not sys.stdout.isatty(), markup=False)
+    is_terminal, page = sys.stdout.isatty(), _Page()
+    width = Console().width if is_terminal else WIDTH
+    console = Console(file=page, width=width, force_terminal=is_terminal, soft_wrap=not is_terminal, markup=False)
     left_out: list[str] = []
     while True:
         shown = [index for index, column in enumerate(columns) if column not in left_out]
@@ -42,11 +47,22 @@ def print_table(
         ):
             break
         left_out.append(droppable[0])
-    with console.capture() as captured:  # Rich would end the process if the reader of a pipe has left.
-        console.print(table)
-    print(captured.get(), end="")
+    console.print(table)
+    print(page.getvalue(), end="")
     if left_out:
         print(f"a wider terminal also shows: {', '.join(column for column in columns if column in left_out)}")
+
+
+class _Page(io.StringIO):
+    """Takes a table from Rich, which would end the process if the reader of stdout has left.
+
+    Where stdout has no UTF-8, Rich draws with ASCII.
+    """
+
+    @property
+    def encoding(self) -> str:
+        """The encoding of stdout."""
+        return sys.stdout.encoding or "utf-8"
 
 
 def _table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Table:
@@ -69,12 +85,22 @@ def print_markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Non
 
 def print_warning(text: str) -> None:
     """Prints one line on stderr; text of a stranger shows no control characters and is cut."""
-    print(f"dextron-bench: {printable_line(text)}", file=sys.stderr)
+    with suppress(OSError):  # A full or closed stderr changes no exit code.
+        print(f"dextron-bench: {printable_line(text)}", file=sys.stderr, flush=True)
 
 
 def print_json(value: Any) -> None:
-    """Prints a value as JSON on stdout."""
-    print(json.dumps(value, indent=1))
+    """Prints a value as JSON on stdout; numbers that are not finite become null."""
+    print(json.dumps(_plain(value), indent=1, allow_nan=False), file=json_output())
+
+
+def _plain(value: Any) -> Any:
+    """The value, with None for each number that JSON cannot write."""
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @contextmanager

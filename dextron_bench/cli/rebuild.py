@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +13,7 @@ from pathlib import Path
 from dextron_bench.cli.exit_codes import DONE
 from dextron_bench.cli.output import print_table
 from dextron_bench.cli.rebuild_steps import STEPS, Step
+from dextron_bench.storage import programs
 
 LEDGER = Path("leaderboard/rebuilt")  # A file for each step: hashes of what it read and of what it made.
 DOCUMENTS = ("README.md", "docs/*.md", "recordings/README.md")  # Their numbers come from data.
@@ -68,7 +68,7 @@ class Rebuild:
         read = _inputs(step)
         for command in step.commands:
             words = [path for word in shlex.split(command.format(runs=self.runs)) for path in _expanded(word)]
-            code = subprocess.run([sys.executable, "-m", "dextron_bench", *words]).returncode
+            code = subprocess.run(programs.python("-m", "dextron_bench", *words), check=False).returncode
             if code:
                 raise StepFailed(f"{step.name}: `dextron-bench {' '.join(words)}` ended with code {code}; run it again")
         for source, place in step.copies:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import shutil
+import os
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +24,10 @@ RunName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
 
 class NotConfirmed(ValueError):
     """Runs that would be removed without a confirmation."""
+
+
+class LinkedRuns(ValueError):
+    """Some of the runs to which one link leads."""
 
 
 class AlreadyArchived(ValueError):
@@ -81,6 +86,8 @@ class Note:
 class Archive:
     """Move runs out of the way, into a folder beside the folder of all runs; move them back to use them again.
 
+    Of a run whose folder, or whose method's folder, is a link, the link moves and its files stay where they are.
+
     Example: dextron-bench runs archive mine-near0.06/synthetic
     """
 
@@ -90,14 +97,16 @@ class Archive:
     """Folder of all runs."""
 
     def __call__(self) -> int:
-        archive = self.runs.with_name(f"{self.runs.name}-{ARCHIVE}")
-        for entry in [_find(self.runs, name) for name in self.run]:
-            place = archive / entry.name
-            if place.exists():
+        from dextron_bench.storage import folders
+
+        archive = self.runs.parent / f"{self.runs.name or Path.cwd().name}-{ARCHIVE}"
+        places = {folder: archive / folder.relative_to(self.runs) for folder in _folders(self.runs, self.run)}
+        for folder, place in places.items():
+            if os.path.lexists(place):
                 raise AlreadyArchived(f"{place} exists; remove it, or give it another name")
             place.parent.mkdir(parents=True, exist_ok=True)
-            shutil.move(entry.folder, place)
-            _remove_if_empty(entry.folder.parent)
+            folders.move(folder, place)
+            _remove_if_empty(folder, self.runs)
             print(place)
         return DONE
 
@@ -105,6 +114,9 @@ class Archive:
 @dataclass(frozen=True)
 class Remove:
     """Remove runs with all their files, after a question.
+
+    Of a run whose folder, or whose method's folder, is a link, only the link is removed. Its files stay, as do those to
+    which links in a run's folder lead; a line names the place.
 
     Example: dextron-bench runs rm mine-near0.06/synthetic --yes
     """
@@ -117,16 +129,19 @@ class Remove:
     """Remove them without a question."""
 
     def __call__(self) -> int:
-        entries = [_find(self.runs, name) for name in self.run]
+        from dextron_bench.storage import folders
+
+        places = _folders(self.runs, self.run)
         if not self.yes:
-            names = ", ".join(entry.name for entry in entries)
+            names = ", ".join(self.run)
             if not sys.stdin.isatty():
                 raise NotConfirmed(f"{names} would be removed for good; confirm with --yes")
             if input(f"remove {names} for good? [y/N] ").strip().lower() not in ("y", "yes"):
                 return DONE
-        for entry in entries:
-            shutil.rmtree(entry.folder)
-            _remove_if_empty(entry.folder.parent)
+        for folder in places:
+            for target in folders.remove(folder):
+                print_warning(f"only the link to {target} was removed; its files are still there")
+            _remove_if_empty(folder, self.runs)
         return DONE
 
 
@@ -160,10 +175,27 @@ class Export:
         return DIFFERS if left_out else DONE
 
 
-def _remove_if_empty(folder: Path) -> None:
-    """Removes the folder of a label, unless it has other runs."""
-    with suppress(OSError):
-        folder.rmdir()
+def _remove_if_empty(folder: Path, runs: Path) -> None:
+    """Removes the folder of the label of a folder that was removed, unless it has other runs."""
+    if folder.parent != runs:
+        with suppress(OSError):
+            folder.parent.rmdir()
+
+
+def _folders(runs: Path, names: Iterable[str]) -> list[Path]:
+    """The folders of runs, each once; if the folder of a method is a link, that link stands for all its runs.
+
+    Raises LinkedRuns if some of these runs are not named, and UnknownRun.
+    """
+    from dextron_bench.runs import catalogue
+
+    known = catalogue.entries(runs)
+    chosen = {entry.folder for entry in (catalogue.find(known, name) for name in names)}
+    places = {folder: folder.parent if folder.parent.is_symlink() else folder for folder in chosen}
+    for folder in places.values():
+        if others := [entry.name for entry in known if entry.folder.parent == folder and entry.folder not in chosen]:
+            raise LinkedRuns(f"{folder} is a link, and it has {', '.join(others)} too; name all of its runs, or none")
+    return sorted(set(places.values()))
 
 
 def _find(runs: Path, name: str) -> Entry:

@@ -21,6 +21,10 @@ class BadNumber(ValueError):
     """A number that a flag cannot have."""
 
 
+class BadName(ValueError):
+    """An argument whose bytes are no text."""
+
+
 def check_numbers(command: Any) -> None:
     """Raises BadNumber if a flag that takes whole numbers has a negative one: all of them count something."""
     for field in dataclasses.fields(command):

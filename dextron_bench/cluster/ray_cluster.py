@@ -10,8 +10,9 @@ import secrets
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, redirect_stdout
+from contextlib import ExitStack, chdir, contextmanager, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any
 
@@ -72,7 +73,9 @@ class RayCluster:
             quiet.enter_context(_without_messages())
             if self._address == LOCAL:
                 quiet.enter_context(_token_without_home())
-            self._connect()
+            empty = quiet.enter_context(TemporaryDirectory(prefix="dextron-ray-", ignore_cleanup_errors=True))
+            with chdir(empty):  # Ray's workers search the working folder for modules, before all others.
+                self._connect()
             self._quiet = quiet.pop_all()
         self._perform = self._ray.remote(PERFORM)
         self._inputs = inputs.References(self._ray.put)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dextron_bench.methods import registry, specs, weights
-from dextron_bench.methods.agents import as_agent_error
+from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
@@ -110,15 +110,13 @@ def _installed_learner(run: RunFolder, result: dict[str, Any]) -> Learner | None
     config = schemas.read(run.config, schemas.METHOD_CONFIG)
     if config["code"]["sha256"] or specs.parse(config["code"]["class"]).kind != "module":
         return None  # A config never makes the code of a file run.
-    method = registry.create(config["code"]["class"], config["settings"])
-    with as_agent_error(f"method {config['code']['class']!r} with the settings in {run.config}"):
-        learns, label = isinstance(method, Learner), registry.label(method)
-    if label != result["method"]:
+    try:
+        method = registry.create(config["code"]["class"], config["settings"])
+    except (registry.BadSettings, AgentError) as error:
+        raise AgentError(f"{error} (with the settings in {run.config})") from error
+    if (label := registry.label(method)) != result["method"]:
         raise atomic.DamagedFile(run.config, f"it is of {label!r}, and the result is of {result['method']!r}")
-    if not learns:  # A policy transfer has no weights of its own.
-        return None
-    assert isinstance(method, Learner)
-    return method
+    return method if isinstance(method, Learner) else None  # A policy transfer has no weights of its own.
 
 
 def _copy(file: Path, copy: Path) -> None:

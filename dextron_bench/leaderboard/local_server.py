@@ -67,15 +67,25 @@ class FormSite(Site, Protocol):
         ...
 
 
+class NoPort(RuntimeError):
+    """A port at which this process cannot listen."""
+
+    def __init__(self, port: int, why: str) -> None:
+        super().__init__(f"port {port}: {why}; choose another with --port, or --port 0 for a free one")
+
+
 class LocalServer(ThreadingHTTPServer):
     """Serves a site on this machine only."""
 
     daemon_threads = True
 
     def __init__(self, site: Site, port: int) -> None:
-        """Listens at a port; 0 takes a free one. Raises OSError."""
+        """Listens at a port; 0 takes a free one. Raises NoPort."""
         self.site = site
-        super().__init__((LOOPBACK, port), _Handler)
+        try:
+            super().__init__((LOOPBACK, port), _Handler)
+        except OSError as error:
+            raise NoPort(port, error.strerror or str(error)) from error
 
     @property
     def address(self) -> str:

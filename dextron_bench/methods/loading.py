@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
+import os
 import sys
 from collections.abc import Callable
+from importlib.machinery import ModuleSpec, PathFinder
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
@@ -38,7 +40,7 @@ def load_class(spec: AgentSpec) -> Any:
     if spec.kind == "method":
         return _load_installed(spec.name)
     if spec.kind == "module":
-        module = _import(str(spec), lambda: importlib.import_module(spec.location))
+        module = _import(str(spec), lambda: _named_module(spec.location))
     elif spec.kind == "file":
         module = _import(str(spec), lambda: _module_of_file(spec))
     else:
@@ -48,6 +50,14 @@ def load_class(spec: AgentSpec) -> Any:
         instead = f"; it has {', '.join(classes)}" if classes else ""
         raise UnknownMethod(f"method {str(spec)!r}: {spec.location} has no class {spec.name!r}{instead}")
     return getattr(module, spec.name)
+
+
+def find_package(name: str) -> ModuleSpec | None:
+    """The package or module of a name, installed or else in the working folder; None if neither has it.
+
+    Raises ValueError if the name is no module's.
+    """
+    return importlib.util.find_spec(name) or PathFinder.find_spec(name, [os.getcwd()])
 
 
 def class_origin(cls: type) -> dict[str, str | None]:
@@ -79,6 +89,17 @@ def _import(spec: str, load: Callable[[], Any]) -> Any:
         raise UnknownMethod(f"method {spec!r} needs the Python module {error.name}, which is not installed") from error
     except (Exception, SystemExit) as error:
         raise UnknownMethod(f"method {spec!r} cannot be imported: {type(error).__name__}: {error}") from error
+
+
+def _named_module(name: str) -> ModuleType:
+    """The module of a dotted name. If its package lies in the working folder, that folder is searched from now on.
+
+    It is searched last: no file there replaces a module of a library.
+    """
+    package = name.partition(".")[0]
+    if package not in sys.modules and importlib.util.find_spec(package) is None and find_package(package):
+        sys.path.append(os.getcwd())
+    return importlib.import_module(name)
 
 
 def _module_of_file(spec: AgentSpec) -> ModuleType:

@@ -87,6 +87,7 @@ def create(text: str, settings: Mapping[str, Any] | None = None, reaches: str = 
             method = method.for_source(reaches)
         method_settings.remember(method, settings or {})
         run_label = label(method)
+        _read_length(method)
     if not isinstance(run_label, str) or not NAME.fullmatch(run_label):
         raise UnknownMethod(f"{text!r} has the label {run_label!r}: use letters, digits and . _ + -, as in 'rlil-0.1'")
     return method
@@ -162,6 +163,13 @@ def package_files(cls: type) -> list[Path]:
         return []
     file = Path(module.__file__)
     return visible(file.parent, "*.py") if module.__package__ else [file]
+
+
+def _read_length(method: Entrant) -> None:
+    """Computes what a learner derives from its settings, so that settings which it does not know are refused here."""
+    learner = getattr(method, "source_policy", method)
+    for name in ("epochs", "period"):
+        getattr(learner, name, None)
 
 
 @contextmanager

@@ -104,6 +104,8 @@ def _parameters(method: type) -> dict[str, tuple[Any, Any]]:
 def _short(value: object) -> str:
     """A value as a part of a label."""
     text = f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float) and float(text) != value:  # Six digits say another number.
+        text = repr(value)
     if len(text) <= LONGEST_VALUE and NAME.fullmatch(f"a{text}"):
         return text
     return hashing.digest(repr(value).encode())[:8]

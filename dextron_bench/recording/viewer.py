@@ -16,6 +16,8 @@ from typing import IO
 
 from rerun.experimental import ViewerClient
 
+from dextron_bench.storage import programs
+
 LOOPBACK = "127.0.0.1"
 HEADLESS = "--headless"  # A viewer without a window.
 START_TIMEOUT = 60.0  # [s] in which a viewer must start.
@@ -93,7 +95,7 @@ def viewer_process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> I
     """
     if logs is None and HEADLESS not in arguments:
         require_screen()
-    command = [sys.executable, "-m", "rerun", "--bind", LOOPBACK, *arguments]
+    command = programs.python("-m", "rerun", "--bind", LOOPBACK, *arguments)
     environment = {"WGPU_BACKEND": "vulkan", **os.environ} if logs else None
     process = subprocess.Popen(command, env=environment, stdout=logs, stderr=logs, start_new_session=True)
     try:

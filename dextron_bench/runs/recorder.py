@@ -7,7 +7,6 @@ import os
 import pickle
 import queue
 import subprocess
-import sys
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -19,11 +18,12 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import recording_files
+from dextron_bench.storage import programs
 from dextron_bench.storage.limited_process import SINGLE_THREADED
 
 EACH = 12  # Recordings for each process, at least: a process takes as long to start as to write them, some 2 s.
 AHEAD = 3  # Recordings for each process that are written or wait for it; with more, the rollout waits.
-COMMAND = (sys.executable, "-P", "-m", "dextron_bench.runs.recorder_process")  # -P: nothing of the working folder.
+COMMAND = programs.python("-m", "dextron_bench.runs.recorder_process")
 
 
 class LostProcess(RuntimeError):

@@ -25,13 +25,58 @@ class FolderBusy(RuntimeError):
 def visible(folder: Path, pattern: str) -> list[Path]:
     """Files and folders below a folder that match a pattern, sorted; without those below it that are hidden.
 
-    What is hidden, with a name that starts with a dot, is not complete or was given up.
+    What is hidden, with a name that starts with a dot, is not complete or was given up. A pattern that begins with
+    `**/` is searched at all depths. Links to folders are followed, except to a folder around the link.
     """
-    return sorted(
-        path
-        for path in folder.glob(pattern)
-        if not any(name.startswith(".") for name in path.relative_to(folder).parts)
-    )
+    name = pattern.removeprefix("**/")
+    places = [folder] if name == pattern else _folders(folder, (os.path.realpath(folder),))
+    paths = {path for place in places for path in place.glob(name)}
+    return sorted(path for path in paths if not any(part.startswith(".") for part in path.relative_to(folder).parts))
+
+
+def _folders(folder: Path, around: tuple[str, ...]) -> Iterator[Path]:
+    """A folder and all visible folders below it; `around` are the real paths of this folder and of those around it."""
+    yield folder
+    with suppress(PermissionError, NotADirectoryError, FileNotFoundError), os.scandir(folder) as entries:
+        below = [
+            Path(folder, entry.name) for entry in entries if not entry.name.startswith(".") and os.path.isdir(entry)
+        ]
+        for place in below:
+            if (real := os.path.realpath(place)) not in around:
+                yield from _folders(place, (*around, real))
+
+
+def links(folder: Path) -> list[Path]:
+    """The symbolic links at or below a folder; what they lead to is not searched."""
+    if folder.is_symlink():
+        return [folder]
+    places = [Path(place, name) for place, folders, files in os.walk(folder) for name in (*folders, *files)]
+    return [place for place in places if place.is_symlink()]
+
+
+def move(folder: Path, place: Path) -> None:
+    """Moves a folder, or a link to one. Links at and below it lead where they led before."""
+    here = Path(os.path.realpath(folder.parent), folder.name)
+    relative = [link for link in links(folder) if not os.path.isabs(os.readlink(link))]
+    targets = {link.relative_to(folder): os.path.realpath(link) for link in relative}
+    shutil.move(folder, place)
+    for name, target in targets.items():
+        if not Path(target).is_relative_to(here):
+            (place / name).unlink()
+            (place / name).symlink_to(target, target_is_directory=os.path.isdir(target))
+
+
+def remove(folder: Path) -> list[Path]:
+    """Removes a folder with all its files, and of links, there and below, the link alone.
+
+    Returns the folders that such links led to.
+    """
+    targets = [Path(os.path.realpath(link)) for link in links(folder) if link.is_dir()]
+    if folder.is_symlink():
+        folder.unlink()
+    else:
+        shutil.rmtree(folder)
+    return targets
 
 
 @contextmanager

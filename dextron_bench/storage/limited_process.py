@@ -9,11 +9,10 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dextron_bench.storage import limited_start
+from dextron_bench.storage import limited_start, programs
 from dextron_bench.storage.limited_start import READY
 
 try:
@@ -58,7 +57,7 @@ def run(target: str, arguments: Sequence[str], content: bytes, memory: int, seco
     It may use `memory` [bytes] of address space more than after its imports (Linux), and `seconds` of time. Raises
     NotStarted if the imports fail.
     """
-    command = [sys.executable, "-P", limited_start.__file__, target, str(memory), str(seconds), *arguments]
+    command = programs.python(limited_start.__file__, target, str(memory), str(seconds), *arguments)
     environment = {**os.environ, **SINGLE_THREADED}
     try:
         done = subprocess.run(

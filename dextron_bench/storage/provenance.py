@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.storage import hashing
+from dextron_bench.storage import hashing, programs
 from dextron_bench.storage.folders import visible
 
 PACKAGES = ("dextron-bench", "mujoco", "dm-control", "numpy", "scipy", "pandas", "pyarrow", "torch", "rerun-sdk")
@@ -95,11 +95,17 @@ def version_of(name: str) -> str | None:
 
 def _git(*arguments: str) -> str | None:
     package = Path(__file__).resolve().parents[1]
-    if not (package.parent / ".git").exists():
+    git = programs.find("git")
+    if git is None or not (package.parent / ".git").exists():
         return None
     try:
         process = subprocess.run(
-            ["git", "-C", str(package), *arguments], capture_output=True, text=True, timeout=10, check=True
+            [git, "-C", str(package), *arguments],
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            timeout=10,
+            check=True,
         )
     except (OSError, subprocess.SubprocessError):
         return None

@@ -5,6 +5,7 @@ This module is in the lowest layer because training, runs and leaderboard all us
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,12 +36,17 @@ class RunFolder:
     @property
     def identity(self) -> str:
         """Label, source of reaches and seed as the path has them, such as `rlil-0.1/real/seed0`."""
-        return "/".join(self.path.resolve().parts[-3:])
+        return "/".join(self._parts[-3:])
 
     @property
     def label(self) -> str:
         """The label of the method, as the path has it."""
-        return self.path.resolve().parts[-3]
+        return self._parts[-3]
+
+    @property
+    def _parts(self) -> tuple[str, ...]:
+        """The parts of the path as it is named: links may lead to folders of other names."""
+        return Path(os.path.abspath(self.path)).parts
 
     @property
     def seed(self) -> int:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -17,11 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from dextron_bench.storage import schemas
+from dextron_bench.storage import programs, schemas
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.run_folder import TRACKING
 
-COMMAND = (sys.executable, "-m", "dextron_bench.tracking.process")
+COMMAND = programs.python("-m", "dextron_bench.tracking.process")
 LIVE = "live"  # The tracker that opens a window, which stays open after the training.
 GRACE = 30.0  # [s] after the training in which trackers show the rest.
 PATIENCE = 3600.0  # [s] instead, for a training that was over before: nothing runs that a tracker could slow.

@@ -1,6 +1,6 @@
 """`dextron-bench` with the splits of the tiny benchmark: `python tests/helpers/tiny_command.py DATA WORD ...`.
 
-DATA is a folder with the splits, as `tiny_benchmark.write` makes it. If there is none, it is made, with rows of `train`.
+DATA is a folder with the splits, as `tiny_benchmark.write` makes it. If there is none, it is made, with `train`.
 """
 
 import signal

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import fields
 from importlib.metadata import EntryPoint, EntryPoints
@@ -12,10 +13,11 @@ import pytest
 
 from baselines.exp import Exp
 from baselines.floors import Nothing, Random
+from baselines.rlil import Rlil
 from dextron_bench.methods import loading, registry
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.registry import UnknownMethod
-from dextron_bench.methods.settings import settings_class
+from dextron_bench.methods.settings import _short, settings_class
 from dextron_bench.storage import hashing
 
 AGENT = """
@@ -219,3 +221,33 @@ def test_equal_seeds_act_equally_and_other_seeds_do_not():
     first, again, other = (Random().agent(seed).act(states) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert (first != other).any()
+
+
+def test_a_module_is_found_in_the_working_folder_but_replaces_none_that_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", list(sys.path))
+    (tmp_path / "my_agents").mkdir()
+    (tmp_path / "my_agents" / "near.py").write_text("class Near:\n    name = 'near'\n    def agent(self, seed): ...\n")
+    for name in ("scipy", "colorsys"):
+        (tmp_path / f"{name}.py").write_text("raise ImportError('planted')\n")
+    assert registry.find_method("my_agents.near:Near").name == "near"
+    assert sys.path[-1] == str(tmp_path)
+    with pytest.raises(UnknownMethod, match="colorsys has no class 'Agent'"):
+        registry.find_method("colorsys:Agent")
+
+
+def test_settings_that_differ_in_the_last_digit_have_labels_that_differ():
+    """Runs of equal labels would share a folder; values that six digits say exactly keep their labels."""
+    values = [0.1, 0.9999999, 0.99999995, 1.0, 1e-7, 1e6, 1234567.0, 0.1 + 0.2]
+    labels = [_short(value) for value in values]
+    assert len(set(labels)) == len(values)
+    assert labels[:3] == ["0.1", "0.9999999", "0.99999995"]
+    assert [_short(value) for value in (1.0, 2000.0, 1e6)] == ["1", "2000", "1e+06"]
+    assert [Rlil(dur=dur).label for dur in (0.1, 1.0, 0.9999999)] == ["rlil-0.1", "rlil-1", "rlil-0.9999999"]
+
+
+def test_settings_that_a_learner_does_not_know_are_refused_when_it_is_made():
+    with pytest.raises(AgentError, match="KeyError: 'qumck'"):
+        registry.create("baselines.rlil:Rlil", {"preset": "qumck"})

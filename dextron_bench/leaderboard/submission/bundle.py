@@ -23,6 +23,7 @@ import jsonschema
 from jsonschema.exceptions import best_match
 
 from dextron_bench.storage import atomic, hashing, limited_process
+from dextron_bench.storage.folders import visible
 from dextron_bench.storage.printable import first_hidden
 from dextron_bench.storage.run_folder import RunFolder
 
@@ -58,7 +59,7 @@ def pack(folder: Path, entry: Mapping[str, Any], agent: Mapping[str, Path], file
 
     `entry` is what the manifest says of the submission (see `Entry.manifest`).
     """
-    run_files = [path for seed in entry["seeds"] for path in sorted(RunFolder.of_seed(folder, seed).path.rglob("*"))]
+    run_files = [path for seed in entry["seeds"] for path in visible(RunFolder.of_seed(folder, seed).path, "**/*")]
     members = {name: path for path in run_files if MEMBER.fullmatch(name := str(path.relative_to(folder)))}
     check_agent(agent)
     members |= {f"{AGENT}/{name}": path for name, path in agent.items()}

@@ -27,7 +27,10 @@ PUBLIC = {  # Modules of the benchmark that agents may import, and the modules t
     *("dextron_bench.success", "dextron_bench.success.network"),
     *("dextron_bench.world", "dextron_bench.world.model", "dextron_bench.world.task"),
 }
-WORKER = ("dextron_bench.methods.isolation", "dextron_bench.methods.loading", "dextron_bench.methods.specs")
+WORKER = (
+    *("dextron_bench.methods.isolation", "dextron_bench.methods.loading", "dextron_bench.methods.specs"),
+    "dextron_bench.storage.programs",
+)
 WORKER_FILES = ("worker", "guard", "policy_files", "protocol", "sandbox")  # In WORKER's first package.
 NETWORK = ("socket.connect", "socket.bind", "socket.send", "socket.getaddrinfo", "socket.gethostby")
 DATABASE = "sqlite3.connect"  # A database can attach any other file.

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
 from dataclasses import asdict, dataclass, field, replace
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.methods import specs
+from dextron_bench.methods import loading, specs
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import guard, sandbox
 from dextron_bench.methods.specs import AgentSpec
+from dextron_bench.storage import programs
 
 
 class NoSandbox(AgentError):
@@ -30,8 +29,8 @@ class NoSandbox(AgentError):
 class Launch:
     """How to start an agent's process: by its own command, or, if `command` is empty, by the Python worker.
 
-    `spec` has absolute paths. `readable` are the files and folders that the process may read beside Python's own.
-    Code that is not `trusted` starts in the sandbox or not at all.
+    `spec` has absolute paths; `folder` has the package of a module. `readable` are the files and folders that the
+    process may read beside Python's own. Code that is not `trusted` starts in the sandbox or not at all.
     """
 
     spec: AgentSpec
@@ -40,6 +39,7 @@ class Launch:
     weights: str = ""
     readable: tuple[str, ...] = ()
     trusted: bool = True
+    folder: str = ""
 
     def command_line(self, scratch: str, memory: int, disk: int) -> list[str]:
         """The words of the whole command: sandbox, limits [bytes], and the agent that writes to `scratch`.
@@ -49,7 +49,7 @@ class Launch:
         if not self.trusted and not sandbox.is_available():
             raise NoSandbox(self.spec)
         request = json.dumps({**asdict(self), "scratch": scratch, "constants": guard.constants()})
-        worker = [sys.executable, "-P", "-m", "dextron_bench.methods.isolation.worker", request]
+        worker = programs.python("-m", "dextron_bench.methods.isolation.worker", request)
         return sandbox.wrap(self.command or worker, scratch, self.readable, memory, disk, self._public_files())
 
     def _public_files(self) -> list[Path]:
@@ -75,14 +75,16 @@ def prepare_launch(
     if spec.kind == "policy":
         file = _existing(spec.location)
         return Launch(replace(spec, location=file), readable=(file,), trusted=trust)
-    code: list[str] = []
+    code, folder = list[str](), ""
     if spec.kind == "file":
         spec = replace(spec, location=_existing(spec.location))
         code = [spec.location]
     elif spec.kind == "module" and (package := _find_package(spec.location.partition(".")[0])):
         code = list(package.submodule_search_locations or [package.origin or ""])
+        folder = str(Path(code[0]).parent)
     file = str(weights.resolve()) if weights else ""
-    return Launch(spec, settings=settings or {}, weights=file, readable=(*([file] if file else []), *code))
+    readable = (*([file] if file else []), *code)
+    return Launch(spec, settings=settings or {}, weights=file, readable=readable, folder=folder)
 
 
 def _launch_command(spec: AgentSpec) -> Launch:
@@ -101,6 +103,6 @@ def _existing(path: str) -> str:
 
 def _find_package(name: str) -> ModuleSpec | None:
     try:
-        return importlib.util.find_spec(name)
+        return loading.find_package(name)
     except ValueError as error:
         raise AgentError(f"agents cannot come from the module {name} ({error})") from error

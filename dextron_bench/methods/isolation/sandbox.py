@@ -9,12 +9,13 @@ this package's code, since the user has chosen to install it.
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+
+from dextron_bench.storage import programs
 
 # Parts of /usr and /usr/local, and of Python's prefix: other folders there may hold a project with results and splits.
 PARTS = ("bin", "sbin", "lib", "lib32", "lib64", "libexec", "share")
@@ -24,6 +25,7 @@ PROGRAMS = (
     *(f"/usr/local/{part}" for part in PARTS),
     *("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc/ld.so.cache", "/etc/alternatives"),
 )
+PROGRAM = "bwrap"
 SIMULATORS = ("mujoco", "dm_control")  # Packages that are hidden.
 SYSTEM_LIBRARIES = ("/usr/lib", "/usr/local/lib")  # Where other interpreters have packages.
 # The package's data files and folders that begin so hold settings, experts, reaches or published episodes.
@@ -60,11 +62,11 @@ def is_available() -> bool:
 @cache
 def _namespaces() -> tuple[str, ...]:
     """The strictest options for namespaces with which bubblewrap works on this system; empty if there are none."""
-    if not shutil.which("bwrap"):
+    if not (program := programs.find(PROGRAM)):
         return ()
     mounts = ["--ro-bind", "/", "/", "--proc", "/proc", "--dev", "/dev", "--remount-ro", "/dev"]
     for options in (NAMESPACES, NAMESPACES[:3]):
-        command = ["bwrap", *options, *mounts, "/bin/sh", "-c", ":"]
+        command = [program, *options, *mounts, "/bin/sh", "-c", ":"]
         if subprocess.run(command, capture_output=True, check=False).returncode == 0:
             return options
     return ()
@@ -84,7 +86,8 @@ def _bubblewrap(scratch: str, readable: Sequence[str], disk: int, public: Sequen
     folders += [path for path in readable if not Path(path).is_file()]
     secrets = [] if public else secret_files()
     hidden = _hidden(package) if public else [place for place in secrets if place.is_dir()]
-    command = ["bwrap", *_namespaces(), "--die-with-parent", "--new-session", "--proc", "/proc", "--dev", "/dev"]
+    command = [programs.find(PROGRAM) or PROGRAM, *_namespaces(), "--die-with-parent", "--new-session"]
+    command += ["--proc", "/proc", "--dev", "/dev"]
     command += ["--tmpfs", "/tmp"]
     folders = list(dict.fromkeys(folders if public else [*folders, str(package)]))
     for path in folders:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 import os
 import sys
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -29,6 +31,8 @@ def main(request: dict[str, Any]) -> None:
     installed = loading.load_class(spec) if spec.kind == "method" else None
     if not installed:
         guard.use_constants(request["constants"])
+    if spec.kind == "module":
+        sys.meta_path.append(_Package(spec.location.partition(".")[0], request["folder"]))
     guard.install([Path(path) for path in request["readable"]], Path(request["scratch"]))
     seed = json.loads(questions.readline())["seed"]
     agent = _create_agent(spec, installed, request["settings"], request["weights"], seed)
@@ -51,6 +55,17 @@ def serve(agent: Any, questions: BinaryIO, answers: BinaryIO) -> None:
             )
         answers.write(protocol.write_actions(actions))
         answers.flush()
+
+
+class _Package(MetaPathFinder):
+    """Finds one package in a folder that the guard lets nobody list, after all other packages."""
+
+    def __init__(self, name: str, folder: str) -> None:
+        self._name, self._spec = name, PathFinder.find_spec(name, [folder])
+
+    def find_spec(self, fullname: str, *_: object) -> ModuleSpec | None:
+        """The package, under its own name only."""
+        return self._spec if fullname == self._name else None
 
 
 def _create_agent(spec: AgentSpec, installed: Any, settings: dict[str, Any], weights: str, seed: int) -> Any:

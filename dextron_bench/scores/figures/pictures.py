@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import rc_context, rcdefaults
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox, BboxBase
 
@@ -23,6 +23,7 @@ INLINE: Any = {  # For pictures inside the page: text stays text, and the backgr
     **{"svg.fonttype": "none", "savefig.transparent": True, "legend.frameon": False, "text.parse_math": False},
     **{"axes.spines.top": False, "axes.spines.right": False},
 }
+rcdefaults()  # A file `matplotlibrc` in the working folder, or of the user, changes no picture.
 
 
 class UnknownFormat(ValueError):

@@ -135,8 +135,9 @@ def test_the_sandbox_has_no_simulator_no_splits_and_no_folder_to_write_in(
     probe = """
 import importlib.util, os, sys
 seen = [os.path.join(f, n) for top in sys.path + ["/tmp", {package!r}] for f, _, ns in os.walk(top) for n in ns]
-bad = [n for n in seen if n.endswith((".parquet", "engine.py", "hand.xml", "splits.json")) and "pyarrow" not in n
-       and "dextron" in n or "packages/mujoco/" in n or "libmujoco" in n or "packages/dm_control/" in n]
+ours = ({package!r} + "/", *(os.path.join(top, "dextron_bench/") for top in sys.path))
+bad = [n for n in seen if n.endswith((".parquet", "engine.py", "hand.xml", "splits.json")) and n.startswith(ours)
+       or "packages/mujoco/" in n or "libmujoco" in n or "packages/dm_control/" in n]
 for place in ["/", "/tmp", "/dev/shm", {package!r}, "/usr", "/var"]:
     try:
         open(os.path.join(place, "written"), "w").close()

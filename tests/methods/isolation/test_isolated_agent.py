@@ -38,6 +38,19 @@ def test_installed_methods_play_and_agents_may_print(agent_spec: Callable[[str],
     assert [episode.failure for episode in play(agent_spec(f"print('hello'); {CLOSES}"))] == [""] * 3
 
 
+def test_a_module_in_the_working_folder_plays_and_may_import_its_package(
+    agent_spec: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """It plays in another folder, from which the working folder is neither searched nor listed."""
+    monkeypatch.chdir(tmp_path)
+    package = tmp_path / "my_package"
+    package.mkdir()
+    (package / "distance.py").write_text("NEAR = 0.06\n")
+    agent_spec(f"from my_package.distance import NEAR; {CLOSES.replace('0.06', 'NEAR')}")
+    (tmp_path / "mine.py").rename(package / "agent.py")
+    assert [episode.failure for episode in play("my_package.agent:Agent")] == [""] * 3
+
+
 def test_a_file_may_hold_a_learner_and_its_agent(agent_spec: Callable[[str], str]):
     (episode,) = play(
         agent_spec("from dextron_bench.methods.learners import Track; return np.zeros((len(states), 1))"), CASES[:1]
