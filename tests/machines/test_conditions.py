@@ -6,6 +6,7 @@ Conditions that need another system are tried by `.ci/machines`.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -88,6 +89,7 @@ def test_tables_fit_a_terminal_of_80_columns(tmp_path: Path):
             ["script", "-qec", command, "/dev/null"], cwd=tmp_path, env=environment, capture_output=True, text=True
         )
         assert done.returncode == 0, done.stdout
-        rows = [line for line in done.stdout.splitlines() if line.startswith(("│", "┃"))]
+        lines = re.sub(r"\x1b\[[\d;]*m", "", done.stdout).splitlines()
+        rows = [line for line in lines if line.startswith(("│", "┃"))]
         assert all(len(line.rstrip()) <= 80 for line in rows)
         assert rows or words not in ("list", "recordings list", COMMANDS[2])
