@@ -39,7 +39,7 @@ PACKAGES = (
     *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "pillow", "tyro", "rich", "jsonschema", "threadpoolctl"),
 )
 EXTRAS = {  # By package: the extra that installs it.
-    **{"minari": "minari", "av": "video", "onnxruntime": "onnx", "optuna": "sweep"},
+    **{"minari": "minari", "av": "video", "onnxruntime": "onnx", "optuna": "sweep", "mlflow-skinny": "mlflow"},
     **{"tensorboard": "tensorboard", "trackio": "trackio", "wandb": "wandb", "ray": "cluster"},
 }
 RENDERERS = ("egl", "osmesa", "glfw")

@@ -102,3 +102,14 @@ def test_a_file_without_digests_is_read(tmp_path: Path):
     file.write_bytes(safetensors.numpy.save({"a": ARRAYS["b"]}, {"about": '{"label": "bc"}'}))
     assert tensors.read(file)["a"].tolist() == [1, 2]
     assert tensors.read_about(file) == {"label": "bc"}
+
+
+def test_a_lack_of_memory_is_no_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    tensors.write(tmp_path / "a.safetensors", {"a": np.zeros(3)}, {})
+
+    def fail(_: bytes) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(tensors, "load", fail)
+    with pytest.raises(MemoryError):
+        tensors.read(tmp_path / "a.safetensors")
