@@ -43,7 +43,7 @@ EXTRAS = {  # By package: the extra that installs it.
     **{"tensorboard": "tensorboard", "trackio": "trackio", "wandb": "wandb", "ray": "cluster"},
 }
 RENDERERS = ("egl", "osmesa", "glfw")
-TIMEOUT = 30.0  # [s] for one renderer.
+TIMEOUT = 120.0  # [s] for one renderer.
 RENDER = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 64, 64).render()"
 
 
