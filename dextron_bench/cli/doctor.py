@@ -40,11 +40,11 @@ PACKAGES = (
     *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "pillow", "tyro", "rich", "jsonschema", "threadpoolctl"),
 )
 EXTRAS = {  # By package: the extra that installs it.
-    **{"minari": "minari", "av": "video", "onnxruntime": "onnx", "optuna": "sweep"},
+    **{"minari": "minari", "av": "video", "onnxruntime": "onnx", "optuna": "sweep", "mlflow-skinny": "mlflow"},
     **{"tensorboard": "tensorboard", "trackio": "trackio", "wandb": "wandb", "ray": "cluster"},
 }
 RENDERERS = ("egl", "osmesa", "glfw")
-TIMEOUT = 30.0  # [s] for one renderer.
+TIMEOUT = 120.0  # [s] for one renderer.
 RENDER = "import mujoco; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 64, 64).render()"
 
 

@@ -80,5 +80,5 @@ def write_files(files: Sequence[ResultFile], runs: Path) -> None:
     for file in files:
         place = runs / file.path
         if content_hash(file.content) != file.sha256:
-            raise atomic.DamagedFile(place, "it arrived with other bytes than it was sent with")
+            raise atomic.DamagedFile(place, "it arrived with other bytes than it was sent with", "run again")
         atomic.write_atomically(place, lambda part, content=file.content: part.write_bytes(content))

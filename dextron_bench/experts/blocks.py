@@ -26,6 +26,14 @@ class DamagedBlock(ValueError):
         super().__init__(f"{file} is damaged ({why}); remove it and search again")
 
 
+class ForeignBlock(DamagedBlock):
+    """A block that can be read, but is not one that this version writes for the search."""
+
+    def __init__(self, file: Path, why: object) -> None:
+        advice = "move it away and search again, or search in another folder"
+        ValueError.__init__(self, f"{file} is not of this search or of another version ({why}); {advice}")
+
+
 @dataclass(frozen=True, slots=True)
 class Tally:
     """The progress of a search: finished blocks, draws tried, rows kept, rows with all 20 rewards."""
@@ -131,16 +139,18 @@ def read(file: Path) -> pd.DataFrame:
     """A block's draws with their outcomes; raises DamagedBlock."""
     try:
         return tables.read(file, tables.DRAWS)
+    except tables.OtherColumns as error:
+        raise ForeignBlock(file, error) from error
     except tables.BadTable as error:
         raise DamagedBlock(file, error) from error
 
 
 def check(file: Path, block: pd.DataFrame, draws: pd.DataFrame) -> None:
-    """Raises DamagedBlock if a block does not hold exactly these draws, in their order."""
+    """Raises ForeignBlock if a block does not hold exactly these draws, in their order."""
     if len(block) != len(draws):
-        raise DamagedBlock(file, f"it has {len(block)} rows, and a block of this search has {len(draws)}")
+        raise ForeignBlock(file, f"it has {len(block)} rows, and a block of this search has {len(draws)}")
     if differing := [name for name in draws if (block[name].to_numpy() != draws[name].to_numpy()).any()]:
-        raise DamagedBlock(file, f"its column {differing[0]!r} differs from the draws of this search")
+        raise ForeignBlock(file, f"its column {differing[0]!r} differs from the draws of this search")
 
 
 def total(done: dict[int, Tally]) -> Tally:

@@ -55,9 +55,9 @@ def load(file: Path) -> pd.DataFrame:
     try:
         rows = pd.read_parquet(file)
         actual = rows_digest(rows)
-    except FileNotFoundError:
-        raise
     except (OSError, ValueError, KeyError, TypeError) as error:
+        if isinstance(error, OSError) and error.errno is not None:  # Of the system, and not of the decoder.
+            raise
         raise DamagedDatabase(f"expert database {file} is damaged ({error}); make it again with `mc`") from error
     if actual != expected:
         raise DamagedDatabase(f"expert database {file} does not match its summary; make it again with `mc`")

@@ -53,7 +53,7 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
             _copy(run.curve, copy.curve)
         if learner is not None:
             if hashing.sha256(run.weights) != (result.get("training") or {}).get("sha256"):
-                raise atomic.DamagedFile(run.weights, "it is not the file that the result names")
+                raise atomic.OtherForm(run.weights, "it is not the file that the result names")
             file = f"seed{result['seed']}.safetensors"
             _copy(run.weights, weights.shipped_folder(learner, result["reaches"]) / file)
         taken.append(copy.path)
@@ -115,7 +115,7 @@ def _installed_learner(run: RunFolder, result: dict[str, Any]) -> Learner | None
     except (registry.BadSettings, AgentError) as error:
         raise AgentError(f"{error} (with the settings in {run.config})") from error
     if (label := registry.label(method)) != result["method"]:
-        raise atomic.DamagedFile(run.config, f"it is of {label!r}, and the result is of {result['method']!r}")
+        raise atomic.OtherForm(run.config, f"it is of {label!r}, and the result is of {result['method']!r}")
     return method if isinstance(method, Learner) else None  # A policy transfer has no weights of its own.
 
 

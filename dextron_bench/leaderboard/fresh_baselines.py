@@ -54,7 +54,7 @@ def stored_settings(board: Path, reaches: str) -> tuple[FreshSettings, list[Spli
     if not (about.exists() and file.exists()):
         return None
     fresh = FreshSettings(**schemas.read(about, schemas.FRESH_SETTINGS))
-    return fresh, from_frame(_read(file, tables.CASES), reaches)
+    return fresh, from_frame(tables.read_own(file, tables.CASES), reaches)
 
 
 def play(
@@ -77,7 +77,7 @@ def problems(
     """
     claimed, reaches = result["fresh"], result["reaches"]
     if run.fresh.exists():
-        splits = from_frame(_read(run.fresh, tables.FRESH_EPISODES), reaches)
+        splits = from_frame(tables.read_own(run.fresh, tables.FRESH_EPISODES), reaches)
         faults = _faults_of_submission(run, claimed, splits, threads, report)
     elif (known := stored_settings(board, reaches)) is None:
         return [f"its fresh settings are missing from {board / FOLDER}"]
@@ -93,7 +93,7 @@ def _faults_of_submission(
     run: RunFolder, claimed: dict[str, Any], splits: list[Split], threads: int, report: Progress
 ) -> list[str]:
     """How the fresh scores of a submission's row differ from its actions, played again."""
-    table = _read(run.fresh, tables.FRESH_EPISODES)
+    table = tables.read_own(run.fresh, tables.FRESH_EPISODES)
     source = sources.open_source(splits[0].reaches)
     replayed = replay_check.replay_table(source, splits, table, threads, report)
     stated = FreshSettings(claimed["submission"], claimed["beacon"])
@@ -122,10 +122,3 @@ def _redrawn(claimed: dict[str, Any], reaches: str, splits: list[Split], threads
     again = {split.name: split.digest for split in fresh.draw(reaches, threads, report)}
     differing = [split.name for split in splits if again.get(split.name) != split.digest]
     return [f"its fresh settings of {', '.join(differing)} do not follow from its beacon"] if differing else []
-
-
-def _read(file: Path, columns: tables.Columns) -> pd.DataFrame:
-    try:
-        return tables.read(file, columns)
-    except tables.BadTable as error:
-        raise atomic.DamagedFile(file, error) from error

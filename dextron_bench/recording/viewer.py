@@ -20,7 +20,7 @@ from dextron_bench.storage import programs
 
 LOOPBACK = "127.0.0.1"
 HEADLESS = "--headless"  # A viewer without a window.
-START_TIMEOUT = 60.0  # [s] in which a viewer must start.
+START_TIMEOUT = 180.0  # [s] in which a viewer must start.
 NOTICE_TIME = 8.0  # [s] after which the viewer no longer shows its notices.
 DRAW_TIME = 1.5  # [s] in which the viewer draws a new step.
 

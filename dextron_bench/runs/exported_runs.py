@@ -69,7 +69,7 @@ def _exported(entry: Entry, seed: int) -> ExportedRun:
 
 
 def _state(run: RunFolder, failure: str) -> str:
-    """The state of a run, of which `failure` says why its last attempt failed."""
+    """The state of a run; `failure` says why its last attempt failed."""
     trainings = loop.training_folders(run.path.parent).items()
     is_training = any(Checkpoints(folder, seeds).is_locked for folder, seeds in trainings if run.seed in seeds)
     if is_training or playing.state(run):

@@ -19,10 +19,7 @@ def stored_episodes(folder: RunFolder, splits: Sequence[Split]) -> pd.DataFrame:
     file = folder.episodes
     if not file.exists():
         return pd.DataFrame()
-    try:
-        table = tables.read(file, tables.EPISODES)
-    except tables.BadTable as error:
-        raise atomic.DamagedFile(file, error) from error
+    table = tables.read_own(file, tables.EPISODES)
     digests = table["split"].map({split.name: split.digest for split in splits})
     return table[digests.isna() | (digests == table["digest"])]
 

@@ -97,7 +97,7 @@ def run_identity(run: RunFolder) -> dict[str, Any]:
     try:
         return {name: content[name] for name in ("method", "reaches", "seed")}
     except KeyError as error:
-        raise atomic.DamagedFile(run.config, f"it lacks {error}") from error
+        raise atomic.OtherForm(run.config, f"it lacks {error}") from error
 
 
 def select(table: pd.DataFrame, episode_filter: EpisodeFilter) -> tuple[pd.DataFrame, int]:

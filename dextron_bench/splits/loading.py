@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -167,7 +168,7 @@ def split_digest(rows: pd.DataFrame) -> str:
 def _catalogue() -> dict[str, dict[str, Any]]:
     try:
         return json.loads(files("dextron_bench.data").joinpath("splits.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (FileNotFoundError, ValueError) as error:
         raise DamagedSplit(f"the catalogue of splits cannot be read ({error}); reinstall the package") from error
 
 
@@ -177,4 +178,6 @@ def _table(reaches: str, name: str) -> pd.DataFrame:
         try:
             return pd.read_parquet(file)
         except (OSError, ValueError) as error:
+            if isinstance(error, OSError) and error.errno not in (None, errno.ENOENT):  # Permission, for example.
+                raise
             raise DamagedSplit(f"the splits of {reaches!r} reaches cannot be read; reinstall the package") from error

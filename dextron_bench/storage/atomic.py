@@ -20,10 +20,29 @@ NO_LINKS = LACKING | {errno.EPERM, errno.EACCES, errno.EMLINK, errno.EXDEV}  # O
 
 
 class DamagedFile(ValueError):
-    """A file that cannot be read; the message names it and says what to do."""
+    """A file whose content is not what was written; the message names it and says what to do.
+
+    Only where this is proven does the message advise to remove anything. The subclasses are for all other cases.
+    """
+
+    def __init__(self, file: Path, why: object, advice: str = "remove it and run again") -> None:
+        super().__init__(f"{file} is damaged ({why}); {advice}")
+
+
+class OtherForm(DamagedFile):
+    """A file that can be read, but does not hold what this version writes."""
 
     def __init__(self, file: Path, why: object) -> None:
-        super().__init__(f"{file} is damaged ({why}); remove it and run again")
+        advice = "restore it, or use the version that wrote it"
+        ValueError.__init__(self, f"{file} is damaged or of another version ({why}); {advice}")
+
+
+class IncompleteFolder(DamagedFile):
+    """A folder without a file that belongs to it, such as a copy that has not ended."""
+
+    def __init__(self, folder: Path, why: object) -> None:
+        advice = "if it is a copy, copy it again; else choose another folder"
+        ValueError.__init__(self, f"{folder} is not complete ({why}); {advice}")
 
 
 def write_atomically(file: Path, write: Callable[[Path], object]) -> None:

@@ -1,8 +1,8 @@
 """A script that starts a module or a script in this process, and gives it limits once it has imported what it needs.
 
 What a process reserves before it reads anything depends on the machine: libraries start a thread for each processor.
-The limits hold for what it uses for its input. It imports nothing of this package, so that it starts quickly. Its
-arguments are those of `limited_process.run`. It prints READY, and then calls `main` of the module or script.
+The limits hold for what it uses for its input. It imports nothing of this package, so that it starts quickly. It
+takes the arguments of `limited_process.run`. It prints READY, and then calls `main` of the module or script.
 """
 
 from __future__ import annotations

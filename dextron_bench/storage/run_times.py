@@ -1,6 +1,6 @@
 """When a run began and when it ended, in a file of its own: all other files are equal if a run is repeated.
 
-The times of the files themselves are those of the last copy. Runs of version 0.1 do not have the file.
+Copying files may change their own times. Runs of version 0.1 do not have the file.
 """
 
 from __future__ import annotations

@@ -220,17 +220,17 @@ def read(file: Path, schema: Schema) -> dict[str, Any]:
     try:
         schema(content)
     except Mismatch as error:
-        raise atomic.DamagedFile(file, error) from error
+        raise atomic.OtherForm(file, error) from error
     return content
 
 
 def read_about(file: Path, schema: Schema) -> dict[str, Any]:
-    """The metadata of a file of tensors, if it has a known form; raises BadTensors, OSError."""
+    """The metadata of a file of tensors, if it has a known form; raises BadTensors, OtherTensors, OSError."""
     about = tensors.read_about(file)
     try:
         schema(about)
     except Mismatch as error:
-        raise tensors.BadTensors(file, error) from error
+        raise tensors.OtherTensors(file, error) from error
     return about
 
 

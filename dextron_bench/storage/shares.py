@@ -146,9 +146,10 @@ class Work:
         """The files of a piece, whose content is as its stamp says."""
         for name, sha256 in listed.items():
             file = self.folder / name
-            if not file.exists() or hashing.sha256(file) != sha256:
-                state = "is not what the piece was made with" if file.exists() else "is missing"
-                raise atomic.DamagedFile(stamp, f"{file} {state}")
+            if not file.exists():
+                raise atomic.IncompleteFolder(self.folder, f"{file} is missing, and {stamp.name} needs it")
+            if hashing.sha256(file) != sha256:
+                raise atomic.DamagedFile(stamp, f"{file} is not what the piece was made with")
         return {self.folder / name: sha256 for name, sha256 in listed.items()}
 
 

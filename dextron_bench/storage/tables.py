@@ -63,6 +63,10 @@ class BadTable(ValueError):
     """A file that is not the table that it should be; the message says why, and does not name the file."""
 
 
+class OtherColumns(BadTable):
+    """A table that can be read, but does not have the columns that this version writes."""
+
+
 def write(file: Path, table: pd.DataFrame, **options: Any) -> None:
     """Writes a table atomically, with a digest of its values; `options` are of `DataFrame.to_parquet`."""
     marked = table.copy(deep=False)
@@ -71,7 +75,7 @@ def write(file: Path, table: pd.DataFrame, **options: Any) -> None:
 
 
 def read(file: Path, columns: Columns) -> pd.DataFrame:
-    """The table in a file, whose columns have the expected values; raises BadTable, FileNotFoundError.
+    """The table in a file, whose columns have the expected values; raises BadTable, OtherColumns, OSError.
 
     A table without a digest, of an earlier version, is accepted.
     """
@@ -79,18 +83,30 @@ def read(file: Path, columns: Columns) -> pd.DataFrame:
         table = pd.read_parquet(file)
         stored, table.attrs = table.attrs.get(DIGEST), {}
         actual = digest(table)
-    except (FileNotFoundError, PermissionError, IsADirectoryError):
-        raise
+    except MemoryError as error:
+        raise MemoryError(f"{file}: {error}") from error
     except Exception as error:  # Damaged bytes raise errors of any type.
+        if isinstance(error, OSError) and error.errno is not None:  # Of the system, and not of the decoder.
+            raise
         raise BadTable(" ".join(str(error).split())[:200] or type(error).__name__) from error
     for name, check in columns.items():
         if name not in table:
-            raise BadTable(f"it lacks the column {name!r}")
+            raise OtherColumns(f"it lacks the column {name!r}")
         if not check(table[name]):
-            raise BadTable(f"its column {name!r} has values that do not belong there")
+            raise OtherColumns(f"its column {name!r} has values that do not belong there")
     if stored not in (None, actual):
         raise BadTable("its values differ from the digest that it carries")
     return table
+
+
+def read_own(file: Path, columns: Columns) -> pd.DataFrame:
+    """The table in a file of this package, as `read` does; raises DamagedFile, OSError."""
+    try:
+        return read(file, columns)
+    except OtherColumns as error:
+        raise atomic.OtherForm(file, error) from error
+    except BadTable as error:
+        raise atomic.DamagedFile(file, error) from error
 
 
 def digest(table: pd.DataFrame) -> str:

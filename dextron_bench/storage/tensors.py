@@ -32,6 +32,13 @@ class BadTensors(ValueError):
         super().__init__(f"{file} is damaged or not a safetensors file ({why})")
 
 
+class OtherTensors(BadTensors):
+    """A file that is whole, but does not hold what this version writes."""
+
+    def __init__(self, file: Path, why: object) -> None:
+        ValueError.__init__(self, f"{file} is of another version or for another purpose ({why})")
+
+
 def write(file: Path, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]) -> None:
     """Writes a file atomically; equal arrays and equal metadata `about`, JSON values, give equal bytes."""
     sealed = {**about, SEAL: [_digest_of_about(about), digest(arrays)]}
@@ -54,6 +61,8 @@ def read(file: Path) -> dict[str, np.ndarray]:
     _header(file)
     try:
         arrays = {name: array.copy() for name, array in load(content).items()}  # Copies are writable.
+    except MemoryError:  # The file may be whole.
+        raise
     except Exception as error:  # A malicious header may raise any error.
         raise BadTensors(file, " ".join(str(error).split()) or type(error).__name__) from error
     check(file, arrays)

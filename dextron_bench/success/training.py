@@ -172,11 +172,11 @@ class _TrainingRun:
                 f"{self._folder} holds another training; remove {file.name} there, or train with its settings"
             )
         if len(about["curve"]) != about["epoch"]:
-            raise tensors.BadTensors(file, "it does not hold what was written; remove it")
+            raise tensors.OtherTensors(file, "its curve does not have a point for each epoch")
         self.epoch, self.curve = about["epoch"], about["curve"]
         expected_names = {*self.arrays(), *(f"best.{name}" for name in self.arrays()), *self._adam_names()}
         if lacking := sorted(expected_names - arrays.keys()):
-            raise tensors.BadTensors(file, f"it is not an unfinished training: it lacks {lacking[0]!r}; remove it")
+            raise tensors.OtherTensors(file, f"it is not an unfinished training: it lacks {lacking[0]!r}")
         self.best = {name: arrays[f"best.{name}"] for name in self.arrays()}
         with torch.no_grad():
             for i, parameter in enumerate(self._parameters):

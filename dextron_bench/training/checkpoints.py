@@ -17,7 +17,7 @@ from typing import Any
 from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Trainer
 from dextron_bench.storage import atomic, hashing, locks, schemas, tensors
-from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder, OtherForm
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.folders import visible
 from dextron_bench.training import checkpoint_list, metric_rows
@@ -86,6 +86,8 @@ class Checkpoints:
             return {}
         try:
             about = schemas.read_about(file, schemas.CHECKPOINT)
+        except tensors.OtherTensors as error:
+            raise OtherForm(self.folder, error) from error
         except tensors.BadTensors as error:
             raise self._damaged(error) from error
         return about
@@ -122,7 +124,7 @@ class Checkpoints:
         """
         progress = self.progress()
         if not progress and len(self._snapshots()) > 1:  # One is of a first period that was interrupted.
-            raise self._damaged(f"{CHECKPOINT} is missing")
+            raise IncompleteFolder(self.folder, f"{CHECKPOINT} is missing")
         if progress and progress.device != device:
             raise FolderMismatch(
                 f"{self.folder} was begun on {progress.device}: continue with --device {progress.device}, or remove it"
@@ -132,7 +134,7 @@ class Checkpoints:
         if progress:
             self._restore(trainer)
             if trainer.epoch != progress.epoch:
-                raise self._damaged(f"it restores epoch {trainer.epoch}, not {progress.epoch}")
+                raise OtherForm(self.folder, f"it restores epoch {trainer.epoch}, not {progress.epoch}")
 
     def finish(self) -> None:
         """Removes the journals, which only an unfinished training needs; raises DamagedFile if something is changed."""
@@ -179,8 +181,10 @@ class Checkpoints:
                 trainer.restore(state, (tensors.read(self._journal(epoch)) for epoch in self._journaled()))
         except (tensors.BadTensors, AgentError) as error:
             cause = error if isinstance(error, tensors.BadTensors) else error.__cause__
-            if isinstance(cause, (tensors.BadTensors, OSError)):
+            if isinstance(cause, tensors.BadTensors):
                 raise self._damaged(cause) from error
+            if isinstance(cause, (OSError, MemoryError)):  # No fault of the files.
+                raise cause from error
             raise
 
     def _discard_after(self, epoch: int) -> None:

@@ -90,7 +90,7 @@ class Curve:
         """Scores on the first rows of `val`, and the actions on the first SHOWN_ROWS."""
         try:
             weights = tensors.read(snapshot)
-        except (tensors.BadTensors, FileNotFoundError) as error:
+        except tensors.BadTensors as error:
             raise DamagedFile(snapshot, error) from error
         with as_agent_error(f"policy() of method {self._learner.name!r}"):
             agent = self._learner.policy(weights)

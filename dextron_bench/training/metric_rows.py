@@ -9,7 +9,7 @@ from typing import Any
 
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.storage import atomic, schemas
-from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder
 
 METRICS = "metrics.jsonl"  # In the folder of a training.
 KEYS = ("epoch", "seed")  # The names in a row that are no metrics.
@@ -66,7 +66,7 @@ def first(folder: Path, count: int) -> bytes:
     file = folder / METRICS
     lines = file.read_bytes().splitlines(keepends=True)[:count] if file.exists() else []
     if len(lines) < count or not all(line.endswith(b"\n") for line in lines):
-        raise DamagedFile(folder, f"{METRICS} ends before line {count}, and its checkpoint needs it")
+        raise IncompleteFolder(folder, f"{METRICS} ends before line {count}, and its checkpoint needs it")
     return b"".join(lines)
 
 

@@ -190,3 +190,9 @@ def test_help_of_a_table_of_commands_has_no_examples(words: list[str], capsys: p
     text = capsys.readouterr().out
     assert "Example" not in text
     assert len(text.splitlines()) < 80
+
+
+def test_too_little_memory_is_one_line_and_no_bug():
+    assert main.explain(MemoryError("malloc of size 8"))[:2] == (2, "there is too little memory (malloc of size 8)")
+    code, line = main.explain(ImportError("rerun.so: failed to map segment from shared object"))
+    assert (code, line.startswith("there is too little memory (rerun.so: failed to map")) == (2, True)

@@ -217,7 +217,9 @@ def test_a_block_that_is_cut_edited_or_of_another_search_is_named(tmp_path):
             tables.write(block, draws)
         with pytest.raises(blocks.DamagedBlock) as caught:
             search(tmp_path, rows=1)
-        assert str(caught.value) == f"{block} is damaged ({reason}); remove it and search again"
+        foreign = f"{block} is not of this search or of another version ({reason}); move it away and search again, or "
+        damaged = f"{block} is damaged ({reason}); remove it and search again"
+        assert str(caught.value).startswith(damaged if change is edited else foreign)
         block.write_bytes(whole)
 
 

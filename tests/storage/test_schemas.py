@@ -54,9 +54,10 @@ def test_a_result_of_the_known_form_is_read_unchanged(tmp_path: Path):
 )
 def test_a_wrong_value_is_named_with_its_place(tmp_path: Path, change: dict[str, Any], message: str):
     text = damage(tmp_path / "result.json", RESULT | change, schemas.RESULT)
-    assert text.startswith(f"{tmp_path}/result.json is damaged (")
+    is_proof = "NaN" in message
+    assert text.startswith(f"{tmp_path}/result.json is damaged {'' if is_proof else 'or of another version '}(")
     assert message in text
-    assert text.endswith("; remove it and run again")
+    assert ("remove" in text) == is_proof
 
 
 @pytest.mark.parametrize("content", [None, "text", [], {}, {"points": None}, {"points": [{"epoch": 1}]}])

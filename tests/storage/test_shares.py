@@ -62,7 +62,7 @@ def test_a_stamp_holds_what_a_piece_depends_on_and_only_its_own_files_are_remove
 
 def test_a_stamp_that_is_no_stamp_is_named(tmp_path: Path):
     atomic.write_json(tmp_path / "pieces" / "a.json", {"name": "a"})
-    with pytest.raises(atomic.DamagedFile, match=r"a\.json is damaged \(it lacks 'depends on'\)"):
+    with pytest.raises(atomic.DamagedFile, match=r"a\.json is damaged or of another version \(it lacks 'depends on'\)"):
         Work(tmp_path, "c0de").read({}.get)
 
 
@@ -80,3 +80,15 @@ def test_the_hash_of_the_code_depends_on_names_and_contents_of_more_files(tmp_pa
     hashes = [provenance.code_hash(), provenance.code_hash(first), provenance.code_hash(second)]
     first.write_text("2")
     assert len({*hashes, provenance.code_hash(first)}) == 4
+
+
+def test_a_file_of_a_piece_that_was_not_copied_is_missing_and_nothing_is_damaged(tmp_path: Path):
+    work, file = Work(tmp_path, "c0de"), tmp_path / "pieces" / "a.parquet"
+    atomic.write_atomically(file, lambda part: part.write_bytes(b"1"))
+    config = {"seed": 3, "physics": "p"}
+    work.write("a", config, [file])
+    file.unlink()
+    with pytest.raises(
+        atomic.IncompleteFolder, match=r"a\.parquet is missing, and a\.json needs it\); if it is a copy"
+    ):
+        work.read({"a": config}.get)

@@ -78,3 +78,14 @@ def test_a_table_that_is_cut_is_refused(tmp_path: Path):
     for length in (0, 3, len(content) // 2, len(content) - 1):
         (tmp_path / "a").write_bytes(content[:length])
         assert refusal(tmp_path / "a")
+
+
+def test_a_lack_of_memory_or_of_a_permission_is_no_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for error in (MemoryError("malloc"), PermissionError(13, "Permission denied"), OSError(5, "Input/output error")):
+
+        def fail(_: Path, error: Exception = error) -> None:
+            raise error
+
+        monkeypatch.setattr(tables.pd, "read_parquet", fail)
+        with pytest.raises(type(error)):
+            tables.read_own(tmp_path / "a.parquet", tables.EPISODES)

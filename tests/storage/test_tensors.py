@@ -120,3 +120,14 @@ def test_a_file_that_cannot_be_mapped_is_read(tmp_path: Path, monkeypatch: pytes
     assert arrays["b"].shape == (0, 3)
     with pytest.raises(ValueError, match="read-only"):
         arrays["a"][0, 0] = 9.0
+
+
+def test_a_lack_of_memory_is_no_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    tensors.write(tmp_path / "a.safetensors", {"a": np.zeros(3)}, {})
+
+    def fail(_: bytes) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(tensors, "load", fail)
+    with pytest.raises(MemoryError):
+        tensors.read(tmp_path / "a.safetensors")

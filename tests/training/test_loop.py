@@ -10,7 +10,7 @@ import pytest
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.storage import atomic, tensors
-from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder, OtherForm
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.training import learning_curve, loop, metric_rows
 from dextron_bench.training.checkpoints import Busy, Checkpoints
@@ -110,7 +110,7 @@ def test_a_training_killed_before_or_after_any_write_ends_with_the_same_bytes(
                 file.write('{"epoch": 5, "lo')
         train(folder)
         assert tiny_training.contents(folder) == unbroken, writes
-    assert writes == 2 * (2 + 3 * 6)  # Two files at the start, six in each period.
+    assert writes == 2 * (3 + 3 * 6)  # Three files at the start, six in each period.
 
 
 def test_a_training_killed_after_the_metrics_of_any_epoch_ends_with_the_same_bytes(
@@ -201,7 +201,12 @@ def test_a_damaged_file_of_a_training_is_named(tmp_path: Path, name: str):
     folder = half_done(tmp_path / "a")
     file = folder / name
     file.write_bytes(file.read_bytes()[: 20 if name != "checkpoint.safetensors" else -20])
-    with pytest.raises(DamagedFile, match=r"is damaged .*; remove it and run again") as caught:
+    cut = (
+        r"is not complete \(metrics\.jsonl ends before line 8"
+        if name == "metrics.jsonl"
+        else r"is damaged .*; remove it"
+    )
+    with pytest.raises(DamagedFile, match=cut) as caught:
         train(folder, Toy(preset="quick", breaks=5))
     assert str(folder) in str(caught.value)
 
@@ -224,9 +229,10 @@ def test_a_lost_file_of_an_unfinished_training_is_named(tmp_path: Path, name: st
     folder = half_done(tmp_path / "a")
     (folder / name).unlink()
     before = tiny_training.contents(folder)
-    with pytest.raises(DamagedFile, match=r"a is damaged \(.*; remove it and run again") as caught:
+    with pytest.raises(IncompleteFolder, match=r"a is not complete \(.*; if it is a copy, copy it again;") as caught:
         train(folder, BREAKS)
     assert name in str(caught.value)
+    assert "remove" not in str(caught.value)
     assert tiny_training.contents(folder) == before
 
 
@@ -292,3 +298,30 @@ def test_two_processes_do_not_train_in_one_folder(tmp_path: Path):
     with checkpoints.locked(), pytest.raises(Busy, match="another process is training in"):
         train(tmp_path / "a")
     train(tmp_path / "a")
+
+
+@pytest.mark.parametrize("error", [PermissionError(13, "Permission denied"), MemoryError("too little")])
+def test_a_journal_that_cannot_be_read_now_is_not_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
+):
+    """The advice to remove a training follows only from damage."""
+    folder, read = half_done(tmp_path / "a"), tensors.read
+
+    def fail(file: Path) -> dict[str, Any]:
+        if file.parent.name == "journals":
+            raise error
+        return read(file)
+
+    monkeypatch.setattr(tensors, "read", fail)
+    with pytest.raises(type(error)):
+        train(folder, BREAKS)
+
+
+def test_a_checkpoint_of_another_version_is_not_called_damaged(tmp_path: Path):
+    folder = half_done(tmp_path / "a")
+    file = folder / "checkpoint.safetensors"
+    about = {name: value for name, value in tensors.read_about(file).items() if name != "device"}
+    tensors.write(file, tensors.read(file), about)
+    with pytest.raises(OtherForm, match=r"it lacks 'device'.*; restore it, or use the version that wrote it") as caught:
+        train(folder, BREAKS)
+    assert "remove" not in str(caught.value)

@@ -23,7 +23,7 @@ LISTS = {"actions": task.STEP_LIMIT, "final": model.STATE}  # With the largest l
 LONGEST = 1000  # Characters of a text.
 TEXT = 2**20  # [bytes] of the unpacked texts of a column in one row group.
 GROUPS = 64  # Row groups; their texts are read one group at a time.
-MEMORY = limited_process.GIBIBYTE  # [bytes] of address space of the process that reads a table.
+MEMORY = 3 * limited_process.GIBIBYTE // 4  # [bytes] of address space, for a table, of the process that reads it.
 SECONDS = 60.0  # [s] that it may take.
 
 

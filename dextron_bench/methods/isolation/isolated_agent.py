@@ -18,7 +18,7 @@ from dextron_bench.methods.isolation.process import NoAnswer, Process
 class Limits:
     """Limits of an agent's process: time [s] to start, for one answer, and for a whole split; memory, disk [bytes]."""
 
-    start: float = 60.0
+    start: float = 300.0  # PyTorch on a slow disk takes a minute.
     answer: float = 10.0
     total: float = 3600.0
     memory: int = 4 * 2**30

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -81,3 +82,14 @@ def test_published_results_in_the_package_are_hidden_from_installed_methods(
     command = sandbox.wrap(["agent"], "/scratch", (), 2**30, 2**20)
     assert command[command.index(str(results)) - 1] == "--tmpfs"
     assert command[command.index(str(splits)) - 1] == "/dev/null"
+
+
+@pytest.mark.skipif(not Path("/bin/sh").exists(), reason="there is no shell that sets limits")
+@pytest.mark.parametrize("outer", ["-d 3000000", "-f 1000", "-n 100"])
+def test_a_lower_limit_of_the_user_stays_and_ends_nothing(outer: str):
+    """A shell ends when it raises a hard limit, and with it the agent."""
+    flag = outer.split()[0]
+    command = f"ulimit {outer}; {sandbox.LIMITS}"
+    shell = ["/bin/sh", "-c", command, "agent", "4194304", "524288", "/bin/sh", "-c", f"ulimit {flag}"]
+    done = subprocess.run(shell, capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == (outer.split()[1], "")
