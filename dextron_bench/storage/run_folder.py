@@ -45,8 +45,10 @@ class RunFolder:
 
     @property
     def _parts(self) -> tuple[str, ...]:
-        """The parts of the path as it is named: links may lead to folders of other names."""
-        return Path(os.path.abspath(self.path)).parts
+        """The parts of the path as it is named: links may lead to folders of other names. A link of another name counts
+        as the folder that it leads to."""
+        named = Path(os.path.abspath(self.path))
+        return (named if named.name.startswith(SEED) else named.resolve()).parts
 
     @property
     def seed(self) -> int:

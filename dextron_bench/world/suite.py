@@ -15,9 +15,8 @@ from dextron_bench.world import model, simulator, task
 from dextron_bench.world.engine import DIVERGED, STATE_BOUND, UNSTABLE
 from dextron_bench.world.environment import SettingQueue, validated_action
 
-ADDITION = (
-    "dm-control dm-env dm-tree lxml wrapt"  # Packages that `import dm_control` wants beside those of the benchmark.
-)
+# Packages that `import dm_control` needs and that the benchmark itself does not.
+ADDITION = "dm-control dm-env dm-tree lxml wrapt"
 
 
 class MissingDmControl(ImportError):

@@ -47,7 +47,7 @@ MISSING_MODULE = ("No module named '{}'", "needs the Python module {}, which", "
 
 
 def skip_without(report: pytest.CollectReport | pytest.TestReport, place: str) -> None:
-    """Turns the report of a failure for the lack of an ability that this machine does not have into that of a skip."""
+    """Turns the report of a failure into a skip, if the test failed for lack of an ability that this machine lacks."""
     if not report.failed:
         return
     text = f"{report.longreprtext}{report.capstderr}"

@@ -47,7 +47,7 @@ def create_context(width: int, height: int) -> Context:
         except Exception as error:  # Each library has its own errors; PyOpenGL without a library: AttributeError.
             if not backends:
                 raise NoGraphics(f"cannot draw off screen with MUJOCO_GL={backend}: {error}; {INSTALL}") from error
-            os.environ.pop("PYOPENGL_PLATFORM", None)  # The next backend refuses that of another one.
+            os.environ.pop("PYOPENGL_PLATFORM", None)  # The next backend refuses another one here.
             continue
         if not _drew:
             _drew.append(os.getpid())
