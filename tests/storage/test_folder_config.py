@@ -136,7 +136,7 @@ def test_processes_with_one_number_write_one_config(tmp_path: Path, names: tuple
     """Two containers that share a folder are both process 1; none loses a temporary file to the other one."""
     assert simultaneous(tmp_path, (0, 0, 0, 0), *names) == [["agrees"] * 4] * 30
     for number in range(30):
-        assert sorted(os.listdir(tmp_path / str(number))) == ["config.json", "provenance.json"]
+        assert sorted(os.listdir(tmp_path / str(number))) == ["config.json", "provenance.json", "times.json"]
 
 
 @pytest.mark.parametrize("names", [("process_one",), ("process_one", "no_links")], ids="+".join)
