@@ -60,7 +60,7 @@ class _Page(io.StringIO):
     """
 
     @property
-    def encoding(self) -> str:
+    def encoding(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         """The encoding of stdout."""
         return sys.stdout.encoding or "utf-8"
 

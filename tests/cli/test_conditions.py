@@ -16,7 +16,7 @@ from dextron_bench.training.checkpoints import LOCK
 from tests.helpers import conditions, tiny_benchmark, tiny_training
 from tests.helpers.tiny_training import TOY
 
-TRAIN = ("run", "--method", TOY, "--seed", "0", "--record", "0", "--no-floors", "--quiet", "--split", "val")
+TRAIN = ("run", "--method", TOY, "--seed", "0", "--record", "0", "--quiet", "--split", "val")
 SHARED = [
     ("no_flock", "no_links", "no_folder_fsync"),
     pytest.param(("no_fcntl", "no_fsync", "no_modes"), marks=pytest.mark.slow),

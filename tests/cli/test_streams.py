@@ -115,7 +115,7 @@ def test_the_size_and_kind_of_a_terminal_change_no_exit_code(more: dict[str, str
 
 def test_json_stands_alone_on_stdout_though_the_agent_prints(tiny_world: Path):
     (tiny_world / "mine.py").write_text(LOUD)
-    words = ["run", "--method", "mine.py:Mine", "--split", "test", "--no-floors", "--quiet", "--record", "0", "--json"]
+    words = ["run", "--method", "mine.py:Mine", "--split", "test", "--quiet", "--record", "0", "--json"]
     process = tiny_benchmark.start(tiny_world / "data", *words)
     out, errors = process.communicate(timeout=120)
     assert process.returncode == 0

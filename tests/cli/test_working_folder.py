@@ -20,8 +20,8 @@ NAMES = {*sys.stdlib_module_names, *packages_distributions(), "sitecustomize", "
 MORE = {  # Words with which a command starts processes, or reads what lies in the working folder.
     "view": (["one.rrd", "--web", "--port", "0"], ["--live", "one.rrd"]),
     "run": (
-        ["--method", "rlil", "--preset", "smoke", "--split", "val", "--no-floors", "--tracker", "tensorboard"],
-        ["--method", "nothing", "--split", "val", "--no-floors", "--record", "2"],
+        ["--method", "rlil", "--preset", "smoke", "--split", "val", "--tracker", "tensorboard"],
+        ["--method", "nothing", "--split", "val", "--record", "2"],
     ),
     "eval": (["--policies", "nosuch", "--quiet"],),
     "check": (["mine.py:Mine"],),
