@@ -160,7 +160,8 @@ def try_all(every: Sequence[tuple[str, ...]], capsys: pytest.CaptureFixture[str]
     return failures
 
 
-EVERY = pytest.mark.parametrize(("command", "cls"), commands(), ids=["-".join(words) for words, _ in commands()])
+ALL = list(commands())
+EVERY = pytest.mark.parametrize(("command", "cls"), ALL, ids=["-".join(words) for words, _ in ALL])
 
 
 @EVERY
