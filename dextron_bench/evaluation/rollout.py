@@ -50,7 +50,7 @@ def _check(source: Source, cases: Sequence[Case], slots: int, bottles: Sequence[
     if not hasattr(source, "path"):
         raise TypeError(f"source must be a source of reaches, as open_source(name) returns it; got {source!r}")
     if wrong := [case for case in cases if not isinstance(case, Case)]:
-        raise TypeError(f"cases must be of type Case, as those of a split; got {wrong[0]!r}")
+        raise TypeError(f"cases must be of type Case, as in a split; got {wrong[0]!r}")
     if not isinstance(slots, Integral) or slots < 1:
         raise ValueError(f"slots must be an integer of at least 1; got {slots!r}")
     if len(bottles) not in (0, len(cases)):
