@@ -9,7 +9,7 @@ import numpy as np
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert
-from dextron_bench.reaches.setting import Setting, Source
+from dextron_bench.reaches.setting import Setting, Source, checked_setting
 from dextron_bench.world.bottle import Bottle
 
 UNUSED = Expert(1.0, 0.0)  # The expert of a case in which no expert acts.
@@ -44,6 +44,23 @@ def replay(
     threads: int = 0,
     bottles: Sequence[Bottle] = (),
 ) -> Iterator[tuple[int, Episode]]:
-    """Plays every setting, perhaps with a bottle, with its actions (T,); yields (index, episode) as episodes end."""
-    cases = [Case(setting, UNUSED, 0.0) for setting in settings]
-    return rollout(Script(actions), source, cases, threads=threads, bottles=bottles)
+    """Plays every setting, perhaps with a bottle, with its actions (T,) or (T, 1); yields (index, episode) as they end.
+
+    Raises SettingError; ValueError for actions of another shape or number; and what `rollout` raises.
+    """
+    cases = [Case(checked_setting(setting), UNUSED, 0.0) for setting in settings]
+    sequences = [_sequence(numbers) for numbers in actions]
+    if len(sequences) != len(cases):
+        raise ValueError(f"actions must have one sequence for each of {len(cases)} settings; got {len(sequences)}")
+    return rollout(Script(sequences), source, cases, threads=threads, bottles=bottles)
+
+
+def _sequence(actions: np.ndarray) -> np.ndarray:
+    """The actions (T,) or (T, 1) of an episode as floats (T,); raises ValueError."""
+    try:
+        numbers = np.asarray(actions, np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"actions of an episode must be numbers of shape (T,) or (T, 1); got {actions!r}") from None
+    if numbers.ndim not in (1, 2) or numbers.shape[1:] not in ((), (1,)):
+        raise ValueError(f"actions of an episode must have shape (T,) or (T, 1); got {numbers.shape}")
+    return numbers.reshape(-1)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from numbers import Integral
 
 import numpy as np
 
@@ -22,7 +23,7 @@ SLOTS = 256  # Episodes at once. Fixed, because the last bits of an agent's acti
 def rollout(
     agent: Agent,
     source: Source,
-    cases: Sequence[Case],
+    cases: Iterable[Case],
     slots: int = SLOTS,
     threads: int = 0,
     track: Track = PLAIN,
@@ -35,10 +36,25 @@ def rollout(
 
     Raises AgentError if the agent raises an exception or returns actions of a wrong shape. An action that is not finite
     or lies outside [-1, 1] by more than `task.LEEWAY` fails its own episode only, and so does a simulation that
-    diverges; AgentCrashed fails all current episodes. A smaller excess is clipped.
+    diverges; AgentCrashed fails all current episodes. A smaller excess is clipped. TypeError and ValueError are for
+    other arguments.
     """
+    cases = list(cases)
+    _check(source, cases, slots, bottles)
     engine = Engine(min(slots, max(len(cases), 1)), threads)
     return _Evaluation(agent, source, cases, engine, track, bottles).run()
+
+
+def _check(source: Source, cases: Sequence[Case], slots: int, bottles: Sequence[Bottle]) -> None:
+    """Raises TypeError and ValueError for arguments that would end a rollout later, or change it silently."""
+    if not hasattr(source, "path"):
+        raise TypeError(f"source must be a source of reaches, as open_source(name) returns it; got {source!r}")
+    if wrong := [case for case in cases if not isinstance(case, Case)]:
+        raise TypeError(f"cases must be of type Case, as in a split; got {wrong[0]!r}")
+    if not isinstance(slots, Integral) or slots < 1:
+        raise ValueError(f"slots must be an integer of at least 1; got {slots!r}")
+    if len(bottles) not in (0, len(cases)):
+        raise ValueError(f"bottles must have one for each of {len(cases)} cases, or none; got {len(bottles)}")
 
 
 class _Evaluation:

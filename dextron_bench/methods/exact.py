@@ -8,7 +8,7 @@ to float32.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -23,18 +23,27 @@ SMALLEST = -400  # Numbers below two to this power count as 0, so that no unit o
 class Perceptron:
     """Linear layers with ReLU between them, for N inputs at once."""
 
-    def __init__(self, layers: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+    def __init__(self, layers: Iterable[tuple[np.ndarray, np.ndarray]]) -> None:
         """Takes weight (in, out) and bias (out,) or (1, out) of each layer in order; raises ValueError."""
-        sizes = [weight.shape for weight, _ in layers]
-        if not layers or any(before[1] != after[0] for before, after in pairwise(sizes)):
+        arrays = [(np.asarray(weight, np.float64), np.asarray(bias, np.float64).reshape(-1)) for weight, bias in layers]
+        sizes = [weight.shape for weight, _ in arrays]
+        is_matrix = all(len(size) == 2 for size in sizes)
+        if not arrays or not is_matrix or any(before[1] != after[0] for before, after in pairwise(sizes)):
             raise ValueError(f"layers of shapes {sizes} do not follow each other")
-        self._layers = [(_IntegerMatrix(weight), np.asarray(bias, np.float64).reshape(-1)) for weight, bias in layers]
+        if any(len(bias) != weight.shape[1] for weight, bias in arrays):
+            raise ValueError(f"biases of sizes {[len(bias) for _, bias in arrays]} do not fit layers of shapes {sizes}")
+        self._inputs = sizes[0][0]
+        self._layers = [(_IntegerMatrix(weight), bias) for weight, bias in arrays]
 
     def __call__(self, x: np.ndarray, alike: bool = False) -> np.ndarray:
         """Outputs (N, out), float64, for inputs (N, in).
 
-        If some hundred rows are `alike`, with zeros in the same columns, this leaves out those columns.
+        If some hundred rows are `alike`, with zeros in the same columns, this leaves out those columns. Raises
+        ValueError for inputs of another shape.
         """
+        x = np.asarray(x, np.float64)  # A tensor of torch has other rules for products.
+        if x.shape[1:] != (self._inputs,):
+            raise ValueError(f"inputs must have shape (N, {self._inputs}); got {x.shape}")
         rows = max(len(x), 1) if alike else BLOCK
         return np.concatenate([self._forward(x[i : i + rows], alike) for i in range(0, max(len(x), 1), rows)])
 

@@ -30,7 +30,7 @@ def open_source(name: str) -> Source:
     """Returns the source of that name. Raises UnknownSource, and MissingData for `real` before its import."""
     try:
         opener = SOURCES[name]
-    except KeyError:
+    except (KeyError, TypeError):  # A list, for example, is no key.
         raise UnknownSource(name) from None
     return opener()
 

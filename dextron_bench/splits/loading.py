@@ -93,6 +93,8 @@ def load_split(reaches: str, name: str) -> Split:
 
     Raises UnknownSplit, UnknownTrack, DamagedSplit.
     """
+    if not isinstance(reaches, str) or not isinstance(name, str):
+        raise UnknownSplit(name, reaches, known_splits(reaches) if isinstance(reaches, str) else ())
     whole_name, (name, track) = name, tracks.parse(name)
     if track.bottle is not None:
         return _load_with_bottles(reaches, whole_name, track)

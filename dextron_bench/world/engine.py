@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,9 @@ class Engine:
     """
 
     def __init__(self, slots: int, threads: int = 0) -> None:
-        """Allocates `slots` slots that step on `threads` threads (0: one per processor)."""
+        """Allocates `slots` slots that step on `threads` threads (0: one per processor). Raises TypeError."""
+        if not isinstance(threads, Integral):
+            raise TypeError(f"threads must be an integer, 0 for one per processor; got {threads!r}")
         self._threads, self._batch = threads, Batch(model.load(), slots, threads)
         self._bottles: Bottles | None = None  # Only if a bottle was ever given: other episodes pay nothing.
         self._qpos, self._qvel = self._batch.bind("qpos"), self._batch.bind("qvel")

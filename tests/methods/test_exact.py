@@ -1,9 +1,11 @@
 """Perceptron: outputs by hand, compared with float64 layers, and equal for any batch."""
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -82,3 +84,27 @@ def test_a_row_that_is_not_finite_does_not_change_other_rows():
 def test_layers_that_do_not_fit_raise():
     with pytest.raises(ValueError, match="do not follow"):
         Perceptron([(np.zeros((2, 3)), np.zeros(3)), (np.zeros((4, 1)), np.zeros(1))])
+
+
+@pytest.mark.parametrize("bias", [np.zeros(2), np.zeros(4)])
+def test_biases_that_do_not_fit_raise(bias: np.ndarray):
+    with pytest.raises(ValueError, match=r"biases of sizes \[\d\] do not fit layers of shapes"):
+        Perceptron([(np.zeros((2, 3)), bias)])
+
+
+def test_a_weight_without_two_axes_raises():
+    with pytest.raises(ValueError, match="do not follow"):
+        Perceptron([(np.zeros(3), np.zeros(1))])
+
+
+@pytest.mark.parametrize("shape", [(2,), (4, 3), (1, 4, 2)])
+def test_inputs_of_another_shape_raise(shape: tuple[int, ...]):
+    with pytest.raises(ValueError, match=r"inputs must have shape \(N, 2\); got"):
+        Perceptron([(np.eye(2), np.zeros(2))])(np.zeros(shape))
+
+
+def test_layers_in_turn_and_tensors_count_as_arrays():
+    """A generator was used up by the check, and the network became the identity; tensors gave products of 3 axes."""
+    network = Perceptron((np.eye(2) * k, np.ones(2)) for k in (2.0, 3.0))
+    tensor: Any = torch.tensor([[1.0, 2.0]])
+    np.testing.assert_array_equal(network(tensor), [[10.0, 16.0]])

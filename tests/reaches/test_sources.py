@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 
@@ -30,3 +30,9 @@ def test_a_source_has_the_name_that_opens_it(name: str):
 def test_an_unknown_name_lists_the_sources():
     with pytest.raises(UnknownSource, match="no source of reaches 'Real'; choose from minjerk, real, synthetic"):
         open_source("Real")
+
+
+@pytest.mark.parametrize("name", [None, 3, ["real"]])
+def test_a_name_that_is_no_text_is_unknown(name: Any) -> None:
+    with pytest.raises(UnknownSource, match="choose from minjerk, real, synthetic"):
+        open_source(name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -114,3 +115,11 @@ def test_a_damaged_catalogue_raises(folder: Path, text: str):
 
 
 # Shipped splits.
+
+
+@pytest.mark.parametrize(
+    ("reaches", "name"), [("synthetic", None), (None, "test"), (["synthetic"], "test"), ("real", 3)]
+)
+def test_names_that_are_no_texts_are_unknown(reaches: Any, name: Any) -> None:
+    with pytest.raises(UnknownSplit, match="no split"):
+        load_split(reaches, name)

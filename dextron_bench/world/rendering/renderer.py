@@ -8,6 +8,7 @@ import os
 import threading
 import weakref
 from dataclasses import dataclass
+from numbers import Integral
 from types import TracebackType
 from typing import Self
 
@@ -17,6 +18,7 @@ from dextron_bench.world.rendering import visuals
 from dextron_bench.world.rendering.context import INSTALL, Context, NoGraphics, create_context, refuse_fork
 from dextron_bench.world.simulator import mujoco
 
+LARGEST = 4096  # [px] width and height of a picture.
 SUPERSAMPLING = 2  # Rendered pixels along each side of a pixel of the picture.
 LIGHT_RADIUS = 0.35  # [m] radius of the lamp that casts soft shadows.
 
@@ -76,7 +78,13 @@ class Renderer:
     """
 
     def __init__(self, width: int, height: int, supersampling: int = SUPERSAMPLING) -> None:
-        """Takes the size of the pictures [pixels] and the supersampling along each side. Raises NoGraphics."""
+        """Takes the size of the pictures [pixels] and the supersampling along each side.
+
+        Raises NoGraphics and ValueError.
+        """
+        for size in (width, height):
+            if not isinstance(size, Integral) or not 1 <= size <= LARGEST:
+                raise ValueError(f"a picture has 1 to {LARGEST} pixels along each side; got {width!r} x {height!r}")
         self._supersampling = supersampling
         self._size = width, height = width * supersampling, height * supersampling
         self._model = visuals.visual_model()

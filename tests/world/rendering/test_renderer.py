@@ -67,3 +67,9 @@ def test_without_graphics_the_error_says_what_to_install(start: np.ndarray, monk
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     with pytest.raises(renderer.NoGraphics, match="MUJOCO_GL='disabled'"):
         renderer.render(start)
+
+
+@pytest.mark.parametrize("size", [(0, 10), (-1, 5), (1.5, 5), (8, 10_000)])
+def test_a_size_that_no_picture_has_is_refused(size: tuple[int, int], start: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="has 1 to 4096 pixels along each side; got"):
+        renderer.render(start, *size)
