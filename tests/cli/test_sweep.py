@@ -65,7 +65,7 @@ def test_the_best_of_a_grid_is_chosen_on_val_alone(here: Path, capsys: pytest.Ca
     states = [(trial["run"], trial["state"]) for trial in content()["trials"]]
     assert states == [
         ("mine-near0.95/synthetic", "done"),
-        (f"mine-near{float(SOLVES):g}/synthetic", "done"),
+        (f"mine-near{float(SOLVES)}/synthetic", "done"),
         ("mine-near-1/synthetic", "failed"),
         ("", "failed"),
     ]
@@ -73,7 +73,7 @@ def test_the_best_of_a_grid_is_chosen_on_val_alone(here: Path, capsys: pytest.Ca
     assert content()["trials"][0]["val"]["return"]["mean"] < 20.0
     assert "raised ZeroDivisionError: oh" in content()["trials"][2]["error"]
     assert "near is above 1" in content()["trials"][3]["error"]
-    assert content()["winner"] == {"trial": 1, "run": f"mine-near{float(SOLVES):g}/synthetic", "split": "val"}
+    assert content()["winner"] == {"trial": 1, "run": f"mine-near{float(SOLVES)}/synthetic", "split": "val"}
     assert "The winner has the highest mean return on val. The sweep has played no other split." in printed
     command = f"dextron-bench run --method mine.py:Mine --near {SOLVES} --reaches synthetic --seed 0 1"
     assert command in printed
@@ -189,7 +189,7 @@ def test_a_class_that_is_no_dataclass_has_flags_too(here: Path, monkeypatch: pyt
     (here / "plain.py").write_text(PLAIN)
     monkeypatch.syspath_prepend(here)
     assert main.main(sweep("--grid", f"near={SOLVES},0.95", method="plain.py:Plain")) == 0
-    assert content()["winner"]["run"] == f"plain-near{float(SOLVES):g}/synthetic"
+    assert content()["winner"]["run"] == f"plain-near{float(SOLVES)}/synthetic"
 
 
 def test_the_story_of_the_docs_runs_as_written(here: Path, capsys: pytest.CaptureFixture[str]):
