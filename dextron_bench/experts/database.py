@@ -56,7 +56,7 @@ def load(file: Path) -> pd.DataFrame:
         rows = pd.read_parquet(file)
         actual = rows_digest(rows)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        if isinstance(error, OSError) and error.errno is not None:  # Of the system, and not of the decoder.
+        if isinstance(error, FileNotFoundError) or getattr(error, "errno", None) is not None:  # Of the system.
             raise
         raise DamagedDatabase(f"expert database {file} is damaged ({error}); make it again with `mc`") from error
     if actual != expected:

@@ -91,7 +91,7 @@ def test_an_unknown_name_lists_the_valid_ones():
 @pytest.mark.parametrize(
     ("spec", "complaint"),
     [
-        ("nosuch.module:Agent", "ModuleNotFoundError: No module named 'nosuch'"),
+        ("nosuch.module:Agent", "needs the Python module nosuch, which is not installed"),
         ("baselines.exp:Nosuch", "baselines.exp has no class 'Nosuch'; it has Exp"),
         ("baselines.exp:dataclass", "is not a method"),
         ("dextron_bench.experts.policies:ExpertAgent", "needs to be a class with `name` and `agent"),
@@ -114,7 +114,7 @@ def test_a_text_that_names_no_method_raises(spec: str, complaint: str):
     [
         ("1 / 0\n", "cannot be imported: ZeroDivisionError: division by zero"),
         ("def broken(:\n", "cannot be imported: SyntaxError: invalid syntax"),
-        ("import nosuchpackage\n", "cannot be imported: ModuleNotFoundError: No module named 'nosuchpackage'"),
+        ("import nosuchpackage\n", "needs the Python module nosuchpackage, which is not installed"),
         ("raise SystemExit(0)\n", "cannot be imported: SystemExit: 0"),
         ("class Other: ...\n", "has no class 'Mine'"),
         ("class Yours:\n    name = 'yours'\n", "has no class 'Mine'; it has Yours"),
@@ -209,7 +209,7 @@ def test_the_description_of_a_broken_installed_method_says_why(monkeypatch: pyte
     broken = EntryPoints([EntryPoint("broken", "nosuch.module:Agent", loading.GROUP)])
     monkeypatch.setattr(loading, "entry_points", lambda **params: broken.select(**params))
     assert registry.installed_methods() == ("broken",)
-    assert registry.describe("broken").startswith("method 'broken' cannot be imported: ModuleNotFoundError")
+    assert registry.describe("broken").startswith("method 'broken' needs the Python module nosuch")
 
 
 def test_settings_are_the_fields_of_the_dataclass():
