@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parsed(words: Sequence[str]) -> Command:
     """The command that the words select, with checked numbers."""
-    if broken := [word for word in words if not _is_utf8(word)]:
+    if broken := [word for word in words if not _is_utf8(word) or "\0" in word]:
         raise usage.BadName(name_fault(broken[0]))
     if list(words) == ["--version"]:
         return _print_version
@@ -100,6 +100,8 @@ def _is_utf8(text: str) -> bool:
 
 def name_fault(name: str) -> str:
     """Why the name of a file, or another argument, cannot be used: it is no UTF-8, or the locale is not."""
+    if "\0" in name:
+        return f"{name!a} has a zero byte, which no name of a file or of anything else has"
     try:
         name.encode(errors="surrogateescape").decode()
     except UnicodeError:

@@ -13,6 +13,7 @@ from typing import Any
 from dextron_bench.cli.method_flags import FIELD
 
 LARGEST_PORT = 65535
+LARGEST = 2**31 - 1  # Threads, rows and seeds are such numbers in the libraries, too.
 RULE = "-"  # Separates the parts of tyro's messages.
 UNKNOWN = re.compile(r"Unrecognized (?:or misplaced )?options: ([^\s,;=]+)")
 
@@ -26,14 +27,14 @@ class BadName(ValueError):
 
 
 def check_numbers(command: Any) -> None:
-    """Raises BadNumber if a flag that takes whole numbers has a negative one: all of them count something."""
+    """Raises BadNumber if a flag that takes numbers has one that is negative or too large: all of them are amounts."""
     for field in dataclasses.fields(command):
         value = getattr(command, field.name)
+        largest = LARGEST_PORT if field.name == "port" else LARGEST
         for number in value if isinstance(value, tuple) else (value,):
-            if isinstance(number, int) and number < 0:
-                raise BadNumber(f"--{field.name.replace('_', '-')} is {number}; it must be 0 or more")
-            if field.name == "port" and number > LARGEST_PORT:
-                raise BadNumber(f"--port is {number}; it must be at most {LARGEST_PORT}")
+            if isinstance(number, int | float) and not 0 <= number <= largest:
+                limit = f"at most {largest}" if number > largest else "0 or more"
+                raise BadNumber(f"--{field.name.replace('_', '-')} is {number}; it must be {limit}")
 
 
 def one_line(box: str) -> str:

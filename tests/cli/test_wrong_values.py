@@ -5,6 +5,7 @@ The commands and their flags come from the table of commands, so that new ones a
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib
 import pkgutil
@@ -72,6 +73,9 @@ def loaded() -> None:
                 importlib.import_module(module.name)
             except ImportError:  # Of an extra that is not installed.
                 continue
+    for name in ("ray", "mlflow.tracking"):  # Which no module imports before a command needs them.
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
     sandbox.is_available()
 
 

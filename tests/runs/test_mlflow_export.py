@@ -47,7 +47,7 @@ def read(tmp_path: Path, needs_mlflow: None) -> dict[str, Any]:
     (tmp_path / "new").rename(tmp_path / "moved")
     client = MlflowClient(f"sqlite:///{tmp_path}/moved/exported/mlflow.db")
     [experiment] = [one for one in client.search_experiments() if one.name == mlflow_export.EXPERIMENT]
-    runs = {run.info.run_name: run for run in client.search_runs([experiment.experiment_id])}
+    runs: dict[str, Any] = {run.info.run_name or "": run for run in client.search_runs([experiment.experiment_id])}
     history = client.get_metric_history(runs[DONE.name].info.run_id, "train.loss")
     runs["history"] = [(point.step, point.value) for point in history]
     return runs
