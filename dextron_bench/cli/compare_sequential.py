@@ -41,7 +41,7 @@ def compare(command: Compare, split: Split) -> int:
             sides.append(open_scores(name, split, command.runs, command.seed, command.threads))
             stack.enter_context(closing(sides[-1]))
         with progress_bar(f"{sides[0].name} and {sides[1].name}", command.quiet) as report:
-            outcome = _play(sides, len(split.cases), report)
+            outcome = _play(sides, len(split), report)
     _print_as_json(sides, outcome, split) if command.json else _print(sides, outcome, split)
     if any(side.failed for side in sides):
         return EPISODES_FAILED
@@ -70,7 +70,7 @@ def _play(sides: list[ScoresInOrder], rows: int, report: Progress) -> Outcome:
 
 def _saved(side: ScoresInOrder, split: Split) -> int:
     """Episodes that a full evaluation would have begun, and this one did not."""
-    return 0 if side.is_stored else side.seeds * len(split.cases) - side.begun
+    return 0 if side.is_stored else side.seeds * len(split) - side.begun
 
 
 def _print_as_json(sides: list[ScoresInOrder], outcome: Outcome, split: Split) -> None:
@@ -81,7 +81,7 @@ def _print_as_json(sides: list[ScoresInOrder], outcome: Outcome, split: Split) -
         }
         for letter, side, scores in zip("ab", sides, (outcome.a, outcome.b), strict=True)
     }
-    about = {"reaches": split.reaches, "split": split.name, "digest": split.digest, "rows": len(split.cases)}
+    about = {"reaches": split.reaches, "split": split.name, "digest": split.digest, "rows": len(split)}
     better = {1: "b", -1: "a", 0: None}[outcome.score.sign]
     decided = {"compared": outcome.a.shape[1], "better": better}
     print_json({**methods, **about, **decided, "return": asdict(outcome.score), "success": asdict(outcome.success)})
@@ -97,9 +97,9 @@ def _print(sides: list[ScoresInOrder], outcome: Outcome, split: Split) -> None:
         _row("success %", (solved[0], solved[1]), outcome.success, 100.0),
     ]
     columns = ["", "A", "B", INTERVAL, "capital", "decided after"]
-    print_table(f"{title} {split.digest[:8]}, {outcome.a.shape[1]} of {len(split.cases)} rows", columns, rows)
+    print_table(f"{title} {split.digest[:8]}, {outcome.a.shape[1]} of {len(split)} rows", columns, rows)
     words = {1: "B scores more", -1: "A scores more", 0: "undecided: the difference may be 0"}
-    print(f"{words[outcome.score.sign]}; compared on {outcome.a.shape[1]} of {len(split.cases)} settings")
+    print(f"{words[outcome.score.sign]}; compared on {outcome.a.shape[1]} of {len(split)} settings")
     for letter, side in zip("AB", sides, strict=True):
         print(f"{letter}: {_effort(side, split)}")
 
@@ -121,5 +121,5 @@ def _effort(side: ScoresInOrder, split: Split) -> str:
     if side.is_stored:
         return f"stored results of {seeds}, nothing was played"
     failed = f"; {side.failed} failed" if side.failed else ""
-    total = side.seeds * len(split.cases)
+    total = side.seeds * len(split)
     return f"{side.begun} of {total} episodes begun ({seeds}), {_saved(side, split)} saved{failed}"

@@ -54,7 +54,7 @@ class Export:
 
         split = load_split(self.reaches, self.split)
         name = self.name or f"dextron/{self.reaches}-{self.split}-{'policies' if self.weights else 'experts'}-v0"
-        rows = min(self.rows, len(split.cases))
+        rows = min(self.rows, len(split))
         export = minari_export.Export(name, split, rows, self._players(), self.author or minari_export.CONTRIBUTORS)
         with progress_bar("episodes", self.quiet) as progress:
             folder = export.write(open_source(self.reaches), home.expanded(self.into), self.threads, progress)

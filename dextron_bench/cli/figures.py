@@ -90,8 +90,8 @@ class Figures:
         yield self._file("fig4b")
         files = [file for file in weights.all_shipped(self.reaches) if file.stem == "seed0"]
         policies = {file.parts[-3]: weights.load_agent_from_file(file) for file in files}
-        model, cases = network.shipped_model(self.reaches), load_split(self.reaches, "test").cases[: self.settings]
-        episodes = exemplars.play_and_predict(model, open_source(self.reaches), cases, policies, self.threads)
+        model, rows = network.shipped_model(self.reaches), load_split(self.reaches, "test").first(self.settings)
+        episodes = exemplars.play_and_predict(model, open_source(self.reaches), rows, policies, self.threads)
         chosen = exemplars.choose(episodes)
         drawn_episodes.ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self._file("fig5"))
         yield self._file("fig5")

@@ -27,7 +27,7 @@ class List:
 
         methods = [(name, registry.describe(name)) for name in registry.installed_methods()]
         splits = [load_split(*names) for names in all_splits()]
-        rows = [(split.reaches, split.name, len(split.cases), split.digest[:8]) for split in splits]
+        rows = [(split.reaches, split.name, len(split), split.digest[:8]) for split in splits]
         print_table("methods", ["name", "description"], methods)
         print_table("splits", ["reaches", "split", "rows", "version"], rows)
         done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in result_files.results(self.runs)]

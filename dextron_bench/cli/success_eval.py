@@ -18,7 +18,8 @@ from dextron_bench.reaches.sources import RankedSource
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from dextron_bench.experts.policies import Case
+    from dextron_bench.splits.loading import Split
+    from dextron_bench.splits.rows import Rows
     from dextron_bench.success.exemplars import PredictedEpisode
     from dextron_bench.success.network import SuccessModel
 
@@ -68,10 +69,10 @@ class Eval:
         players = {EXPERTS: None} | {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
         rows = []
         for name in self.split or ranking_splits(self.reaches):
-            cases = _first(load_split(self.reaches, name).cases, self.rows)
+            whole = _first(load_split(self.reaches, name), self.rows)
             for player, agent in players.items():
-                player_cases = cases if agent else evaluation.with_random_experts(cases)
-                result = evaluation.evaluate(model, source, player_cases, agent, self.threads)
+                played = whole if agent else evaluation.with_random_experts(whole)
+                result = evaluation.evaluate(model, source, played, agent, self.threads)
                 rows.append({"split": name, "player": player, **result.as_dict()})
         if self.json:
             print_json(rows)
@@ -115,12 +116,12 @@ class Explain:
         from dextron_bench.success import exemplars
 
         model, source = load_model(self.model, self.runs, self.reaches), open_source(self.reaches)
-        cases = _first(load_split(self.reaches, self.split).cases, self.rows)
+        rows = _first(load_split(self.reaches, self.split), self.rows)
         policies = {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
-        chosen = exemplars.choose(exemplars.play_and_predict(model, source, cases, policies, self.threads))
+        chosen = exemplars.choose(exemplars.play_and_predict(model, source, rows, policies, self.threads))
         self.into.parent.mkdir(parents=True, exist_ok=True)
         ridges({exemplars.KINDS[kind]: episode for kind, episode in chosen.items()}, self.into)
-        _print_exemplars(chosen, cases)
+        _print_exemplars(chosen, rows)
         if missing := [title for kind, title in exemplars.KINDS.items() if kind not in chosen]:
             print(f"dextron-bench: no episode of this kind: {'; '.join(missing)}", file=sys.stderr)
         print(self.into)
@@ -162,9 +163,9 @@ def _rounded(values: Iterable[float | None], digits: int = 2) -> list[str]:
     return ["" if value is None or math.isnan(value) else f"{value:.{digits}f}" for value in values]
 
 
-def _print_exemplars(chosen: Mapping[str, PredictedEpisode], cases: Sequence[Case]) -> None:
+def _print_exemplars(chosen: Mapping[str, PredictedEpisode], split: Rows) -> None:
     columns = ["kind", "player", "row", "reach", "return", "cause", "correct steps [%]"]
-    numbers = {case.setting: row for row, case in enumerate(cases)}
+    numbers = {case.setting: row for row, case in enumerate(split.cases)}
     rows = []
     for kind, predicted in chosen.items():
         episode = predicted.episode
@@ -174,10 +175,10 @@ def _print_exemplars(chosen: Mapping[str, PredictedEpisode], cases: Sequence[Cas
     print_table("episodes", columns, rows)
 
 
-def _first(cases: Sequence[Case], rows: int) -> Sequence[Case]:
+def _first(split: Split, rows: int) -> Rows:
     if rows < 1:
         raise NoRows(f"--rows must be 1 or more, not {rows}")
-    return cases[:rows]
+    return split.first(rows)
 
 
 def load_model(file: Path | None, runs: Path, reaches: str) -> SuccessModel:

@@ -145,13 +145,13 @@ class View(EpisodeFlags):
         label, agent = weights.agent_by_name(self.method[0], reaches, self.seed[0] if self.seed else 0)
         split = load_split(reaches, self.split[0] if self.split else "test")
         model, source = network.shipped_model(reaches), open_source(reaches)
-        cases = {row: split.case(row) for row in self.row or (0,)}
+        rows = {row: split.rows([row]) for row in self.row or (0,)}
         with recording.open_live_viewer() as (connect, wait):
-            for row, case in cases.items():
+            for row, played in rows.items():
                 properties = {"method": label, "reaches": reaches, "split": split.name, "row": row}
                 title = f"{label}, {split.name} {row}"
-                observer = recording.LiveView(connect, title, source.path(case.setting), properties)
-                episode = success_live.play(agent, source, case, model, observer, self.speed)
+                observer = recording.LiveView(connect, title, source.path(split.case(row).setting), properties)
+                episode = success_live.play(agent, source, played, model, observer, self.speed)
                 print(f"{label} on row {row} of {split.name}: {episode.score:g} of 20")
             wait()
         return DONE

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dextron_bench.evaluation.closing_windows import Choice, Window
-    from dextron_bench.experts.policies import Case
     from dextron_bench.methods.agents import Agent
     from dextron_bench.splits.loading import Split
+    from dextron_bench.splits.rows import Rows
     from dextron_bench.storage.progress import Progress
 
 EXPERT = "expert"
@@ -61,7 +61,7 @@ class Windows:
         pictures.check_format(self.into)
         split, agents = load_split(self.reaches, self.split), dict(map(self._agent, self.agents))
         with progress_bar("windows", self.quiet) as progress:
-            windows, choices = self._play(dict(enumerate(split.cases[: self.rows])), agents, progress)
+            windows, choices = self._play(split.first(self.rows), agents, progress)
         self.into.parent.mkdir(parents=True, exist_ok=True)
         title = f"When closing works, and when agents close: {self.split} of {self.reaches} reaches"
         episodes.windows(windows, choices, title, self.into)
@@ -70,22 +70,22 @@ class Windows:
         return DONE
 
     def _play(
-        self, cases: dict[int, Case], agents: Mapping[str, Agent], progress: Progress
-    ) -> tuple[dict[int, Window], dict[str, dict[int, Choice]]]:
-        """The window of each case that is shown, by row, and the choices of the expert and of each agent."""
+        self, rows: Rows, agents: Mapping[str, Agent], progress: Progress
+    ) -> tuple[dict[int, Window], dict[str, list[Choice]]]:
+        """The window of each row that is shown, by row, and the choices of the expert and of each agent in all rows."""
         from dextron_bench.evaluation import closing_windows
         from dextron_bench.experts.policies import ExpertAgent
         from dextron_bench.reaches.sources import open_source
 
         source, players = open_source(self.reaches), {EXPERT: ExpertAgent(), **agents}
-        choices: dict[str, dict[int, Choice]] = {}
+        choices: dict[str, list[Choice]] = {}
         for number, (name, agent) in enumerate(players.items()):
             progress(number, 1 + len(players), name)
-            choices[name] = closing_windows.play_choices(agent, source, cases, self.threads)
-        if self.failed:
-            cases = _failed(cases, [choices[name] for name in agents])
+            choices[name] = closing_windows.play_choices(agent, source, rows, self.threads)
+        shown = _failed([choices[name] for name in agents]) if self.failed else range(len(rows))
         progress(len(players), 1 + len(players), "forked openings")
-        return closing_windows.play_windows(source, cases, self.threads), choices
+        windows = closing_windows.play_windows(source, rows.rows(shown), self.threads)
+        return dict(zip(shown, windows, strict=True)), choices
 
     def _agent(self, name: str) -> tuple[str, Agent]:
         """The label and the agent of a name."""
@@ -98,15 +98,16 @@ class Windows:
         return weights.agent_by_name(name, self.reaches)
 
 
-def _failed(cases: Mapping[int, Case], choices: Sequence[Mapping[int, Choice]]) -> dict[int, Case]:
-    """The cases in which some agent failed; raises NoRows if there is none."""
-    failed = {row: case for row, case in cases.items() if not all(one[row].success for one in choices)}
+def _failed(choices: Sequence[Sequence[Choice]]) -> Sequence[int]:
+    """The rows in which some agent failed; raises NoRows if there is none."""
+    rows = list(zip(*choices, strict=True))
+    failed = [row for row, chosen in enumerate(rows) if not all(choice.success for choice in chosen)]
     if not failed:
-        raise NoRows(f"no agent failed in any of the {len(cases)} settings; leave out --failed, or give more --rows")
+        raise NoRows(f"no agent failed in any of the {len(rows)} settings; leave out --failed, or give more --rows")
     return failed
 
 
-def _print(split: Split, windows: Mapping[int, Window], choices: Mapping[str, Mapping[int, Choice]]) -> None:
+def _print(split: Split, windows: Mapping[int, Window], choices: Mapping[str, Sequence[Choice]]) -> None:
     """A row for each setting: the first and the last moment that works, and the choices; a failure has an `x`.
 
     The last line counts in how many of these settings some closing works, and in how many the agents succeed.
@@ -116,7 +117,7 @@ def _print(split: Split, windows: Mapping[int, Window], choices: Mapping[str, Ma
         working = window.times[window.works]
         span = f"{working[0]:.2f} to {working[-1]:.2f}" if working.size else "never"
         cells = [f"{one[row].time:.2f}{'' if one[row].success else ' x'}" for one in choices.values()]
-        rows.append([row, split.cases[row].setting.reach, span, *cells])
+        rows.append([row, split.case(row).setting.reach, span, *cells])
     columns = ["row", "reach", "closing works [s]", *(f"{name} [s]" for name in choices)]
     print_table(f"{split.name} of {split.reaches} reaches, version {split.digest[:8]}", columns, rows)
     solvable = sum(bool(window.works.any()) for window in windows.values())

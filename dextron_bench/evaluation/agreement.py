@@ -10,6 +10,7 @@ import pandas as pd
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.reaches import setting
+from dextron_bench.splits.rows import Rows
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import task
 
@@ -56,7 +57,7 @@ def play(outcomes: pd.DataFrame, source: setting.Source, progress: Progress = no
     settings = setting.from_frame(outcomes)
     cases = [Case(one, Expert(gain, critical), 0.0) for one, (gain, critical) in zip(settings, experts, strict=True)]
     returns = np.zeros(len(cases))
-    for count, (number, episode) in enumerate(rollout(ExpertAgent(), source, cases), start=1):
+    for count, (number, episode) in enumerate(rollout(ExpertAgent(), source, Rows(cases=tuple(cases))), start=1):
         returns[number] = episode.score
         progress(count, len(cases))
     return returns

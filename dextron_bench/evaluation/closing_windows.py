@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +11,10 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import openings
 from dextron_bench.experts.openings import NO_DECISION, SUCCEEDS
-from dextron_bench.experts.policies import Case
 from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.timing import CONTROL_STEP
+from dextron_bench.splits.rows import Rows
 from dextron_bench.world import task
 
 
@@ -39,16 +38,16 @@ class Choice:
     success: bool
 
 
-def play_windows(source: Source, cases: Mapping[int, Case], threads: int = 0) -> dict[int, Window]:
-    """The window of each case's setting, by row of the split."""
-    played = openings.play(source, [case.setting for case in cases.values()], threads)
-    return {row: _window(outcomes) for row, (_, outcomes) in zip(cases, played, strict=True)}
+def play_windows(source: Source, rows: Rows, threads: int = 0) -> list[Window]:
+    """The window of each row, with the row's bottle: when closing must arrive, whatever delays it."""
+    played = openings.play(source, [case.setting for case in rows.cases], threads, rows.bottles)
+    return [_window(outcomes) for _, outcomes in played]
 
 
-def play_choices(agent: Agent, source: Source, cases: Mapping[int, Case], threads: int = 0) -> dict[int, Choice]:
-    """The choice of an agent in each case, by row of the split; raises AgentError."""
-    episodes = dict(rollout(agent, source, list(cases.values()), threads=threads))
-    return {row: choice(episodes[place]) for place, row in enumerate(cases)}
+def play_choices(agent: Agent, source: Source, rows: Rows, threads: int = 0) -> list[Choice]:
+    """The choice of an agent in each row; raises AgentError."""
+    episodes = dict(rollout(agent, source, rows, threads=threads))
+    return [choice(episodes[place]) for place in range(len(rows))]
 
 
 def choice(episode: Episode) -> Choice:

@@ -12,7 +12,7 @@ from dextron_bench.splits.loading import Split
 
 def row(split: Split, index: int, episode: Episode) -> dict[str, Any]:
     """An episode's row in the table of episodes; setting and actions are enough to replay it bit for bit."""
-    diagnosed = diagnosis.diagnose(episode, split.cases[index])
+    diagnosed = diagnosis.diagnose(episode, split.case(index))
     return {
         "split": split.name,
         "digest": split.digest,

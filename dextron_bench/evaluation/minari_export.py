@@ -92,16 +92,16 @@ class Export:
         self, storage: MinariStorage, source: Source, threads: int, progress: Progress
     ) -> Iterator[tuple[int, dict[str, Any]]]:
         """Plays and stores every episode; yields its number and its metadata."""
-        cases = self.split.cases[: self.rows]
+        rows = self.split.first(self.rows)
         with _without_size(storage):
             for place, player in enumerate(self.players):
-                for done, (row, episode) in enumerate(rollout(player.agent, source, cases, threads=threads), 1):
+                for done, (row, episode) in enumerate(rollout(player.agent, source, rows, threads=threads), 1):
                     if episode.failure:
                         raise BadExport(f"{player.name} failed in row {row} of {self.split.name!r}: {episode.failure}")
-                    number = place * len(cases) + row
+                    number = place * len(rows) + row
                     storage.update_episodes([_buffer(number, episode)])
                     yield number, {"player": player.name, "row": row} | _episode_metadata(episode)
-                    progress(place * len(cases) + done, len(self.players) * len(cases))
+                    progress(place * len(rows) + done, len(self.players) * len(rows))
 
     def _metadata(self) -> dict[str, Any]:
         """The data set's metadata: Minari's own keys, and everything that the episodes depend on."""

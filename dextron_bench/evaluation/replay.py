@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches.setting import Setting, Source, checked_setting
-from dextron_bench.world.bottle import Bottle
+from dextron_bench.splits.rows import Rows
+from dextron_bench.splits.tracks import PLAIN
 
 UNUSED = Expert(1.0, 0.0)  # The expert of a case in which no expert acts.
 
@@ -39,20 +41,27 @@ class Script:
 
 def replay(
     source: Source,
-    settings: Sequence[Setting],
+    rows: Rows | Sequence[Setting],
     actions: Sequence[np.ndarray],
     threads: int = 0,
-    bottles: Sequence[Bottle] = (),
 ) -> Iterator[tuple[int, Episode]]:
-    """Plays every setting, perhaps with a bottle, with its actions (T,) or (T, 1); yields (index, episode) as they end.
+    """Plays every row with its actions (T,) or (T, 1); yields (index, episode) as they end.
+
+    `rows` is a split or a part of one, whose bottles count and whose track does not, since stored actions are those
+    that arrived; or a list of settings.
 
     Raises SettingError; ValueError for actions of another shape or number; and what `rollout` raises.
     """
-    cases = [Case(checked_setting(setting), UNUSED, 0.0) for setting in settings]
+    rows = rows if isinstance(rows, Rows) else _rows_of(rows)
     sequences = [_sequence(numbers) for numbers in actions]
-    if len(sequences) != len(cases):
-        raise ValueError(f"actions must have one sequence for each of {len(cases)} settings; got {len(sequences)}")
-    return rollout(Script(sequences), source, cases, threads=threads, bottles=bottles)
+    if len(sequences) != len(rows):
+        raise ValueError(f"actions must have one sequence for each of {len(rows)} settings; got {len(sequences)}")
+    return rollout(Script(sequences), source, replace(rows, track=PLAIN), threads=threads)
+
+
+def _rows_of(settings: Sequence[Setting]) -> Rows:
+    """Rows of settings in which no expert acts; raises SettingError."""
+    return Rows(cases=tuple(Case(checked_setting(setting), UNUSED, 0.0) for setting in settings))
 
 
 def _sequence(actions: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""Plays any agent on any list of cases, N episodes at once; the only evaluation loop."""
+"""Plays any agent on any rows, N episodes at once; the only evaluation loop."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from numbers import Integral
 
 import numpy as np
@@ -12,9 +12,8 @@ from dextron_bench.evaluation.perturbation import Perturbation
 from dextron_bench.experts.policies import Case
 from dextron_bench.methods.agents import Agent, AgentCrashed, AgentError, Privileged, as_agent_error
 from dextron_bench.reaches.setting import Source
-from dextron_bench.splits.tracks import PLAIN, Track
+from dextron_bench.splits.rows import Rows
 from dextron_bench.world import model, task
-from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.engine import DIVERGED, Engine, Step
 
 SLOTS = 256  # Episodes at once. Fixed, because the last bits of an agent's actions may depend on the batch size.
@@ -23,56 +22,44 @@ SLOTS = 256  # Episodes at once. Fixed, because the last bits of an agent's acti
 def rollout(
     agent: Agent,
     source: Source,
-    cases: Iterable[Case],
+    rows: Rows | Iterable[Case],
     slots: int = SLOTS,
     threads: int = 0,
-    track: Track = PLAIN,
-    bottles: Sequence[Bottle] = (),
 ) -> Iterator[tuple[int, Episode]]:
-    """Plays every case once, under a track; yields (index of the case, episode) in the order in which episodes end.
+    """Plays every row once; yields (its index in `rows`, episode) in the order in which episodes end.
 
-    `bottles` has one for each case; without it, all have the model's bottle. An episode has the states and actions of
-    the simulation, not what the agent saw and sent under a track.
+    `rows` is a split or a part of one, `split.rows(numbers)`, which is played under the split's track and with its
+    bottles; a list of cases has neither. An episode has the states and actions of the simulation, not what the agent
+    saw and sent under a track.
 
     Raises AgentError if the agent raises an exception or returns actions of a wrong shape. An action that is not finite
     or lies outside [-1, 1] by more than `task.LEEWAY` fails its own episode only, and so does a simulation that
     diverges; AgentCrashed fails all current episodes. A smaller excess is clipped. TypeError and ValueError are for
     other arguments.
     """
-    cases = list(cases)
-    _check(source, cases, slots, bottles)
-    engine = Engine(min(slots, max(len(cases), 1)), threads)
-    return _Evaluation(agent, source, cases, engine, track, bottles).run()
+    rows = rows if isinstance(rows, Rows) else Rows(cases=tuple(rows))
+    _check(source, rows, slots)
+    engine = Engine(min(slots, max(len(rows), 1)), threads)
+    return _Evaluation(agent, source, rows, engine).run()
 
 
-def _check(source: Source, cases: Sequence[Case], slots: int, bottles: Sequence[Bottle]) -> None:
+def _check(source: Source, rows: Rows, slots: int) -> None:
     """Raises TypeError and ValueError for arguments that would end a rollout later, or change it silently."""
     if not hasattr(source, "path"):
         raise TypeError(f"source must be a source of reaches, as open_source(name) returns it; got {source!r}")
-    if wrong := [case for case in cases if not isinstance(case, Case)]:
-        raise TypeError(f"cases must be of type Case, as in a split; got {wrong[0]!r}")
+    if wrong := [case for case in rows.cases if not isinstance(case, Case)]:
+        raise TypeError(f"rows must be a split, or have the type Case; got {wrong[0]!r}")
     if not isinstance(slots, Integral) or slots < 1:
         raise ValueError(f"slots must be an integer of at least 1; got {slots!r}")
-    if len(bottles) not in (0, len(cases)):
-        raise ValueError(f"bottles must have one for each of {len(cases)} cases, or none; got {len(bottles)}")
 
 
 class _Evaluation:
     """Plays one case per slot; a slot gets the next case when its episode ends."""
 
-    def __init__(
-        self,
-        agent: Agent,
-        source: Source,
-        cases: Sequence[Case],
-        engine: Engine,
-        track: Track,
-        bottles: Sequence[Bottle],
-    ) -> None:
+    def __init__(self, agent: Agent, source: Source, rows: Rows, engine: Engine) -> None:
         n = engine.slots
-        self._bottles = bottles
-        self._perturbation = Perturbation(track, n)
-        self._agent, self._source, self._cases, self._engine = agent, source, cases, engine
+        self._perturbation = Perturbation(rows.track, n)
+        self._agent, self._source, self._rows, self._engine = agent, source, rows, engine
         self._next = 0
         self._case = np.full(n, -1)
         self._length = np.zeros(n, int)
@@ -116,11 +103,11 @@ class _Evaluation:
     def _refill(self, slots: np.ndarray) -> None:
         """Starts the next cases in free slots; slots without a case stay idle."""
         self._case[slots] = -1
-        slots = slots[: len(self._cases) - self._next]
+        slots = slots[: len(self._rows) - self._next]
         if not slots.size:
             return
-        cases = self._cases[self._next : self._next + len(slots)]
-        bottles = self._bottles[self._next : self._next + len(slots)]
+        cases = self._rows.cases[self._next : self._next + len(slots)]
+        bottles = self._rows.bottles[self._next : self._next + len(slots)]
         self._case[slots] = self._next + np.arange(len(slots))
         self._next += len(slots)
         states = self._engine.begin(slots, [self._source.path(case.setting) for case in cases], bottles)
@@ -147,7 +134,7 @@ class _Evaluation:
         """The index of a slot's case, and its episode so far."""
         n = self._length[slot]
         return int(self._case[slot]), Episode(
-            self._cases[self._case[slot]].setting,
+            self._rows.cases[self._case[slot]].setting,
             self._states[slot, : n + 1].copy(),
             self._actions[slot, :n].copy(),
             self._rewards[slot, :n].copy(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from dextron_bench.reaches.reach import Path
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import task
+from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.engine import Engine
 
 NEAR = 0.16  # [m] distance from which on closing is tried.
@@ -19,6 +20,7 @@ TOGETHER = 96  # Settings that are played together.
 SLOTS = 1024
 NO_DECISION, FAILS, SUCCEEDS = -1, 0, 1
 Episode = tuple[np.ndarray, np.ndarray]  # States (T, 48) and outcomes (T,) of an opening.
+Begin = Callable[[np.ndarray, np.ndarray], np.ndarray]  # Starts numbered openings in slots; returns their states.
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +48,15 @@ class Openings:
         return [(self.states[rows], self.outcomes[rows]) for rows in map(self.rows, range(len(self)))]
 
 
-def play(source: Source, settings: Sequence[Setting], threads: int = 0) -> list[Episode]:
-    """The openings of some settings."""
-    engine = Engine(SLOTS, threads)
+def play(
+    source: Source, settings: Sequence[Setting], threads: int = 0, bottles: Sequence[Bottle] = ()
+) -> list[Episode]:
+    """The openings of some settings; `bottles` has one for each, or none if all have the model's."""
+    engine, paths = Engine(SLOTS, threads), [source.path(setting) for setting in settings]
     return [
         episode
         for first in range(0, len(settings), TOGETHER)
-        for episode in _play_together(engine, source, settings[first : first + TOGETHER])
+        for episode in _play_together(engine, paths[first : first + TOGETHER], bottles[first : first + TOGETHER])
     ]
 
 
@@ -63,13 +67,16 @@ def joined(episodes: Sequence[Episode]) -> Openings:
     return Openings(np.concatenate(states).astype(np.float32), np.concatenate(outcomes), starts)
 
 
-def _play_together(engine: Engine, source: Source, settings: Sequence[Setting]) -> Iterator[Episode]:
-    """The opening of each setting."""
-    paths = [source.path(setting) for setting in settings]
-    live = np.arange(len(settings))
-    states = engine.begin(live, paths)
-    episodes: list[list[np.ndarray]] = [[] for _ in settings]
-    first_near = np.full(len(settings), -1)
+def _play_together(engine: Engine, paths: Sequence[Path], bottles: Sequence[Bottle]) -> Iterator[Episode]:
+    """The opening of each path."""
+
+    def begin(slots: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        return engine.begin(slots, [paths[k] for k in numbers], [bottles[k] for k in numbers if bottles])
+
+    live = np.arange(len(paths))
+    states = begin(live, live)
+    episodes: list[list[np.ndarray]] = [[] for _ in paths]
+    first_near = np.full(len(paths), -1)
     decisions, saved = [], []
     for step in range(task.STEP_LIMIT + 1):
         for k, state in zip(live, states, strict=True):
@@ -86,20 +93,20 @@ def _play_together(engine: Engine, source: Source, settings: Sequence[Setting]) 
     episode, step = np.concatenate(decisions).T
     order = np.lexsort((step, episode))
     starts = {name: np.concatenate([part[name] for part in saved])[order] for name in saved[0]}
-    tried = _try(engine, paths, episode[order], starts)
+    tried = _try(engine, begin, episode[order], starts)
     outcomes = [np.full(len(states), NO_DECISION, np.int8) for states in episodes]
     for k, t, outcome in zip(episode[order], step[order], tried, strict=True):
         outcomes[k][t] = outcome
     return zip(map(np.array, episodes), outcomes, strict=True)
 
 
-def _try(engine: Engine, paths: Sequence[Path], episode: np.ndarray, starts: dict[str, np.ndarray]) -> np.ndarray:
-    """Outcomes (n,) of closing from saved states (n, ...) of episodes (n,), which lie in order, with their paths."""
+def _try(engine: Engine, begin: Begin, episode: np.ndarray, starts: dict[str, np.ndarray]) -> np.ndarray:
+    """Outcomes (n,) of closing from saved states (n, ...) of episodes (n,), which lie in order."""
     position = np.arange(len(episode)) - np.searchsorted(episode, episode)
     outcomes = np.full(len(episode), NO_DECISION, np.int8)
 
     def play(rows: np.ndarray) -> None:
-        scores = _close(engine, [paths[k] for k in episode[rows]], {name: part[rows] for name, part in starts.items()})
+        scores = _close(engine, begin, episode[rows], {name: part[rows] for name, part in starts.items()})
         outcomes[rows] = np.where(scores == task.SUCCESS, SUCCEEDS, FAILS)
 
     play(np.flatnonzero(position % FIRST_TRIED == 0))
@@ -111,17 +118,17 @@ def _try(engine: Engine, paths: Sequence[Path], episode: np.ndarray, starts: dic
     return np.where(outcomes == NO_DECISION, before, outcomes)
 
 
-def _close(engine: Engine, paths: Sequence[Path], starts: dict[str, np.ndarray]) -> np.ndarray:
-    """Sums of rewards (n,) of episodes that go on from saved states (n, ...) with a hand that closes at full speed."""
-    scores, playing = np.zeros(len(paths)), np.full(engine.slots, -1)
-    waiting = iter(range(len(paths)))
+def _close(engine: Engine, begin: Begin, episode: np.ndarray, starts: dict[str, np.ndarray]) -> np.ndarray:
+    """Sums of rewards (n,) of numbered openings (n,) that go on from saved states (n, ...) and close at full speed."""
+    scores, playing = np.zeros(len(episode)), np.full(engine.slots, -1)
+    waiting = iter(range(len(episode)))
     while True:
         free = np.flatnonzero(playing < 0)
         new = np.array([number for _, number in zip(free, waiting, strict=False)], int)
         slots = free[: len(new)]
         if len(new):
             playing[slots] = new
-            engine.begin(slots, [paths[number] for number in new])
+            begin(slots, episode[new])
             engine.load(slots, {name: rows[new] for name, rows in starts.items()})
         live = np.flatnonzero(playing >= 0)
         if not live.size:

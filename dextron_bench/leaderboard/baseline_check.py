@@ -49,7 +49,7 @@ def rerun(run: RunFolder, result: dict[str, Any], count: int, threads: int, repo
             if fault := _fault(claimed, split):
                 finding.problems.append(fault)
                 continue
-            done += _rerun_split(run, result, split, drawn_rows(len(split.cases), count), threads, finding)
+            done += _rerun_split(run, result, split, drawn_rows(len(split), count), threads, finding)
             report(done, total)
     except (NotReproducible, weights.MissingWeights, AgentError) as error:
         finding.problems.append(str(error))
@@ -61,7 +61,7 @@ def _fault(claimed: dict[str, Any], split: Split) -> str:
     """Why a split's scores cannot be compared with the split; empty if they can."""
     if split.digest != claimed["digest"]:
         return f"{split.name} is of another version of the split"
-    if {len(claimed[name]) for name in ("scores", "actions") if name in claimed} != {len(split.cases)}:
+    if {len(claimed[name]) for name in ("scores", "actions") if name in claimed} != {len(split)}:
         return f"{split.name} must have one score and one hash of actions for each row of the split"
     return ""
 
@@ -71,10 +71,10 @@ def _rerun_split(
 ) -> int:
     """Runs the agent on rows of a split and adds the differences; returns how many rows it played in the end."""
     table = play_rows(run, result, split, rows, threads)
-    computed, whole = result_files.scores_by_split(table)[split.name], len(rows) == len(split.cases)
+    computed, whole = result_files.scores_by_split(table)[split.name], len(rows) == len(split)
     differences = list(_differences(result["splits"][split.name], computed, rows, whole))
     if differences and not whole:  # An agent may draw numbers in an order that depends on the other episodes.
-        return _rerun_split(run, result, split, np.arange(len(split.cases)), threads, finding)
+        return _rerun_split(run, result, split, np.arange(len(split)), threads, finding)
     finding.problems += [f"{split.name} {difference}" for difference in differences]
     if whole:
         finding.actions[split.name] = computed["actions"]
@@ -95,9 +95,8 @@ def _differences(claimed: dict[str, Any], computed: dict[str, Any], rows: np.nda
 
 def play_rows(run: RunFolder, result: dict[str, Any], split: Split, rows: np.ndarray, threads: int) -> pd.DataFrame:
     """The table of the episodes of a row's agent, run again, on some rows of a split."""
-    source, cases, bottles = sources.open_source(split.reaches), [split.cases[k] for k in rows], split.bottles_of(rows)
-    agent = agent_of(run, result)
-    episodes = dict(rollout(agent, source, cases, threads=threads, track=split.track, bottles=bottles))
+    agent, source = agent_of(run, result), sources.open_source(split.reaches)
+    episodes = dict(rollout(agent, source, split.rows(rows), threads=threads))
     return pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
 
 

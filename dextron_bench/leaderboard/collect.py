@@ -78,7 +78,7 @@ def _is_complete(result: dict[str, Any]) -> bool:
     """True if a result holds all rows of all splits that rank methods, in their present versions."""
     splits = [load_split(result["reaches"], name) for name in ranking_splits(result["reaches"])]
     scored = {name: (split["digest"], len(split["scores"])) for name, split in result["splits"].items()}
-    return all(scored.get(split.name) == (split.digest, len(split.cases)) for split in splits)
+    return all(scored.get(split.name) == (split.digest, len(split)) for split in splits)
 
 
 def _with_tier(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:

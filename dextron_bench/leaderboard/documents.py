@@ -95,7 +95,7 @@ def _values(board: Path) -> Callable[[str], str]:
             case ["search", reaches, name]:
                 return _search(database.load_shipped(reaches)[1], name)
             case ["split", reaches, name, "rows"]:
-                return f"{len(load_split(reaches, name).cases):,}"
+                return f"{len(load_split(reaches, name)):,}"
             case ["split", reaches, name, "narrow"]:
                 cases = load_split(reaches, name).cases
                 return f"{100 * sum(case.window <= hard.WINDOW for case in cases) / len(cases):.1f}"

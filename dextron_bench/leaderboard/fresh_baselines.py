@@ -61,9 +61,9 @@ def play(
     run: RunFolder, result: dict[str, Any], fresh: FreshSettings, splits: list[Split], threads: int, report: Progress
 ) -> None:
     """Plays fresh settings with the agent of a baseline's row, and writes the scores into its result."""
-    parts, total = [], sum(len(split.cases) for split in splits)
+    parts, total = [], sum(len(split) for split in splits)
     for split in splits:
-        parts.append(play_rows(run, result, split, np.arange(len(split.cases)), threads))
+        parts.append(play_rows(run, result, split, np.arange(len(split)), threads))
         report(sum(map(len, parts)), total)
     atomic.write_json(run.result, {**result, "fresh": fresh.scores(pd.concat(parts))})
 
@@ -108,9 +108,9 @@ def _faults_of_baseline(
     """How the fresh scores of a baseline's row differ from the scores of its agent, run again."""
     for split in splits:
         known = result["fresh"]["splits"].get(split.name, {"digest": "", "scores": []})
-        if known["digest"] != split.digest or len(known["scores"]) != len(split.cases):
+        if known["digest"] != split.digest or len(known["scores"]) != len(split):
             return [f"it has no scores for every fresh setting of {split.name}"]
-        rows = drawn_rows(len(split.cases), count)
+        rows = drawn_rows(len(split), count)
         if play_rows(run, result, split, rows, threads)["score"].tolist() != [known["scores"][row] for row in rows]:
             return [f"its scores on fresh settings of {split.name} differ from its episodes, run again"]
     return []
@@ -118,7 +118,7 @@ def _faults_of_baseline(
 
 def _redrawn(claimed: dict[str, Any], reaches: str, splits: list[Split], threads: int, report: Progress) -> list[str]:
     """A problem if the settings do not follow from the hash of the submission and the beacon."""
-    fresh = FreshSettings(claimed["submission"], claimed["beacon"], len(splits[0].cases))
+    fresh = FreshSettings(claimed["submission"], claimed["beacon"], len(splits[0]))
     again = {split.name: split.digest for split in fresh.draw(reaches, threads, report)}
     differing = [split.name for split in splits if again.get(split.name) != split.digest]
     return [f"its fresh settings of {', '.join(differing)} do not follow from its beacon"] if differing else []

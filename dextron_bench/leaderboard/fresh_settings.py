@@ -59,7 +59,7 @@ def to_frame(splits: Sequence[Split]) -> pd.DataFrame:
 def from_frame(table: pd.DataFrame, reaches: str) -> list[Split]:
     """The fresh splits in a table with the columns of a setting, `split`, `gain` and `critical`."""
     return [
-        Split(str(name), reaches, tuple(cases_from_frame(rows)), split_digest(rows))
+        Split(name=str(name), reaches=reaches, digest=split_digest(rows), cases=tuple(cases_from_frame(rows)))
         for name, rows in table.assign(window=0.0).groupby("split", sort=False)
     ]
 

@@ -154,11 +154,13 @@ def _exemplars(table: pd.DataFrame, reaches: str, split: str) -> Iterator[pd.Dat
 
 def _replayed(model: network.SuccessModel, table: pd.DataFrame, reaches: str, split: str) -> Iterator[PredictedEpisode]:
     """Replays all episodes of methods that are not floors, with the model's predictions."""
-    source, cases = sources.open_source(reaches), load_split(reaches, split).cases
+    source, whole = sources.open_source(reaches), load_split(reaches, split)
     table = table[~table["method"].isin(registry.FLOORS)]
-    replayed = dict(replay(source, from_frame(table), table["actions"].tolist()))
+    replayed = dict(replay(source, whole.rows(table["row"]), table["actions"].tolist()))
     for position, row in enumerate(table.to_dict("records")):
-        yield exemplars.predict_episode(model, source, cases[row["row"]], _player(row["method"]), replayed[position])
+        yield exemplars.predict_episode(
+            model, source, whole.case(row["row"]), _player(row["method"]), replayed[position]
+        )
 
 
 def _predicted(file: Path) -> PredictedEpisode | None:

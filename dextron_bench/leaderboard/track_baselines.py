@@ -34,12 +34,12 @@ def missing(result: dict[str, Any], splits: Sequence[Split]) -> list[Split]:
 
 def play(run: RunFolder, result: dict[str, Any], splits: Sequence[Split], threads: int, report: Progress) -> None:
     """Plays splits with the agent of a baseline's row, and writes the scores of each into its result."""
-    done, total = 0, sum(len(split.cases) for split in splits)
+    done, total = 0, sum(len(split) for split in splits)
     for split in splits:
-        table = play_rows(run, result, split, np.arange(len(split.cases)), threads)
+        table = play_rows(run, result, split, np.arange(len(split)), threads)
         result = {**result, "splits": {**result["splits"], **result_files.scores_by_split(table)}}
         atomic.write_json(run.result, result)
-        report(done := done + len(split.cases), total)
+        report(done := done + len(split), total)
 
 
 def _under(reaches: str, split: str, track: str) -> list[str]:

@@ -12,6 +12,7 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.reaches.setting import Setting
+from dextron_bench.splits.rows import Rows
 from dextron_bench.storage import atomic
 from dextron_bench.world import model
 from dextron_bench.world.rendering import renderer
@@ -41,8 +42,8 @@ def write_pictures(folder: Path) -> list[Path]:
 def play_lift() -> Episode:
     """A successful episode: the expert on the first minimum-jerk reach."""
     source = MinjerkSource()
-    case = Case(Setting(source.names[0], 0.0, 0.0, 0.0), EXPERT, window=0.0)
-    return next(episode for _, episode in rollout(ExpertAgent(), source, [case]))
+    row = Rows(cases=(Case(Setting(source.names[0], 0.0, 0.0, 0.0), EXPERT, window=0.0),))
+    return next(episode for _, episode in rollout(ExpertAgent(), source, row))
 
 
 def hand_alone(state: np.ndarray, closure: float) -> np.ndarray:

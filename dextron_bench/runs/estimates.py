@@ -50,11 +50,11 @@ def estimate(
 @cache
 def seconds_per_episode(reaches: str, threads: int) -> float:
     """Duration of an episode [s] on a source of reaches when many are played at once."""
-    cases, source = load_split(reaches, "val").cases[:TIMED], sources.open_source(reaches)
+    rows, source = load_split(reaches, "val").first(TIMED), sources.open_source(reaches)
     start = time.perf_counter()
-    for _ in rollout(ExpertAgent(), source, cases, threads=threads):
+    for _ in rollout(ExpertAgent(), source, rows, threads=threads):
         pass
-    return (time.perf_counter() - start) / len(cases)
+    return (time.perf_counter() - start) / len(rows)
 
 
 def _training(job: TrainingJob, seeds: tuple[int, ...], folder: Path) -> dict[str, Any]:
@@ -64,7 +64,7 @@ def _training(job: TrainingJob, seeds: tuple[int, ...], folder: Path) -> dict[st
     left = learner.epochs - (progress.epoch if progress else 0)
     seconds = timing.seconds_left(folder, left, learner.period)
     if seconds is None and learner.timing_run.epochs <= SHORT:
-        rows = min(POINT_ROWS, len(load_split(job.reaches, "val").cases)) * math.ceil(left / learner.period)
+        rows = min(POINT_ROWS, len(load_split(job.reaches, "val"))) * math.ceil(left / learner.period)
         seconds = left * loop.seconds_per_epoch(learner, job.track(), seeds)
         seconds += rows * len(seeds) * seconds_per_episode(job.reaches, job.threads)
     return {
@@ -94,4 +94,4 @@ def _missing_episodes(run: Run, runs: Path) -> int:
     splits = [load_split(run.source, name) for name in run.splits]
     table = run_files.stored_episodes(run.folder(runs), splits)
     counts = table["split"].value_counts().to_dict() if len(table) else {}
-    return sum(len(split.cases) - counts.get(split.name, 0) for split in splits)
+    return sum(len(split) - counts.get(split.name, 0) for split in splits)

@@ -105,14 +105,14 @@ class EvaluationJob:
         return shares.Work(self.folder.path, self.code)
 
     def _pieces_of(self, split: Split) -> list[RowPiece]:
-        size = ROWS if self.rows_are_independent else len(split.cases)
-        starts = range(0, len(split.cases), size)
-        return [RowPiece(split, range(start, min(start + size, len(split.cases)))) for start in starts]
+        size = ROWS if self.rows_are_independent else len(split)
+        starts = range(0, len(split), size)
+        return [RowPiece(split, range(start, min(start + size, len(split)))) for start in starts]
 
     def _is_stored(self, split: Split, table: pd.DataFrame) -> bool:
         """True if the table has a split's episodes, and the folder has their recordings."""
         stored = table[table["split"] == split.name] if len(table) else table
-        return len(stored) == len(split.cases) and not recording_files.any_missing(self.folder, stored, self.record)
+        return len(stored) == len(split) and not recording_files.any_missing(self.folder, stored, self.record)
 
     def _stored_pieces(self) -> dict[str, shares.Piece]:
         return self._work.read({piece.name: self.config_of(piece) for piece in self.pieces()}.get)
@@ -121,7 +121,7 @@ class EvaluationJob:
         """The rows of all episodes of a split, in order: from its pieces, and played where there are none."""
         parts = self._pieces_of(split)
         if not any(part.name in pieces for part in parts):
-            rows, recordings = self._play_rows(split, range(len(split.cases)), report)
+            rows, recordings = self._play_rows(split, range(len(split)), report)
             self._add_to_manifest(recordings)
             return rows
         for part in parts:
@@ -152,7 +152,7 @@ class EvaluationJob:
                 played[row] = episode_table.row(split, row, episode)
                 if row < self.record and len(episode.actions):
                     about = recording_files.properties(split, row, self.about)
-                    recorder.write(self.folder.recording(split.name, row), split.cases[row], episode, about)
+                    recorder.write(self.folder.recording(split.name, row), split.case(row), episode, about)
                 report(len(played), len(rows))
             recordings = recorder.hashes()
         return [played[row] for row in sorted(played)], recordings

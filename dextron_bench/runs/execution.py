@@ -80,9 +80,7 @@ def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
     copy = run_files.copy_weights(file, folder) if file else None
 
     def play(split: Split, rows: range) -> Played:
-        cases, bottles = split.cases[rows.start : rows.stop], split.bottles_of(rows)
-        episodes = rollout(agent(run, copy), source, cases, threads=threads, track=split.track, bottles=bottles)
-        for place, episode in episodes:
+        for place, episode in rollout(agent(run, copy), source, split.rows(rows), threads=threads):
             yield rows.start + place, episode
 
     facts = run.about | _training_facts(run, copy)
@@ -129,4 +127,4 @@ def _training_facts(run: Run, file: Path | None) -> dict[str, Any]:
     if run.learner is None or run.plan.weights:
         return {"training": facts}
     count = getattr(run.learner, "demonstrations", lambda episodes: None)
-    return {"training": facts | {"demonstrations": count(len(load_split(run.training_source, "train").cases))}}
+    return {"training": facts | {"demonstrations": count(len(load_split(run.training_source, "train")))}}

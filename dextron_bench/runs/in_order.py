@@ -117,9 +117,8 @@ class _Player:
         self._order = random_order(split)
         self._left = [row for row in self._order if row not in self._rows]
         self._kept = self._before = len(self._rows)
-        cases = [split.cases[row] for row in self._left]
         self._episodes: Iterator[tuple[int, Episode]] = rollout(
-            agent, sources.open_source(run.source), cases, SLOTS, threads, split.track
+            agent, sources.open_source(run.source), split.rows(self._left), SLOTS, threads
         )
 
     @property

@@ -33,7 +33,7 @@ def any_missing(folder: RunFolder, table: pd.DataFrame, record: int) -> bool:
 def record(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> None:
     """Writes the recording of an episode, and its hash in the manifest; `about` is as in `properties`."""
     file = folder.recording(split.name, row)
-    sha256 = write(source, file, split.cases[row], episode, properties(split, row, about))
+    sha256 = write(source, file, split.case(row), episode, properties(split, row, about))
     add_to_manifest(folder, {file.name: sha256})
 
 

@@ -13,7 +13,6 @@ from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches import sources
-from dextron_bench.reaches.setting import from_frame
 from dextron_bench.runs import recording_files, result_files, selection
 from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import provenance, schemas
@@ -91,8 +90,7 @@ def _record(group: pd.DataFrame) -> Iterator[None]:
     run, reaches = RunFolder(Path(rows[0]["folder"])), rows[0]["reaches"]
     source, split = sources.open_source(reaches), load_split(reaches, rows[0]["split"])
     about = selection.run_identity(run)
-    bottles = split.bottles_of(row["row"] for row in rows)
-    for place, episode in replay(source, from_frame(group), group["actions"].tolist(), bottles=bottles):
+    for place, episode in replay(source, split.rows(row["row"] for row in rows), group["actions"].tolist()):
         row = rows[place]
         recording_files.record(run, source, split, row["row"], _as_recorded(row, episode), about)
         yield

@@ -52,13 +52,13 @@ def draw(reaches: str, name: str, seed: int, engine: Engine, rows: int = 0, prog
     """
     if reaches == "minjerk" or name not in (*REACHES, "hard"):
         raise NoFreshSettings(f"{name} of {reaches} reaches is not drawn by a search; choose from {list(REACHES)}")
-    source, count = open_source(reaches), rows or len(load_split(reaches, name).cases)
+    source, count = open_source(reaches), rows or len(load_split(reaches, name))
     if name == "hard":
         table = _hard(source, reaches, count, seed, engine, progress)
     else:
         names = {case.setting.reach for part in REACHES[name] for case in _cases(reaches, part)}
         table = solved(source, frozenset(names), count, seed, engine, progress)
-    return Split(name, reaches, tuple(cases_from_frame(table)), split_digest(table))
+    return Split(name=name, reaches=reaches, digest=split_digest(table), cases=tuple(cases_from_frame(table)))
 
 
 def solved(

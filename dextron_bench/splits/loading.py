@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import as_file, files
@@ -16,18 +16,14 @@ import pandas as pd
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches import setting
 from dextron_bench.splits import tracks
+from dextron_bench.splits.rows import Rows, UnknownRow
 from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.storage import hashing
 from dextron_bench.world import bottle
-from dextron_bench.world.bottle import Bottle
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
 SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "hard", "open")
 EVALUATED = ("test", "unseen-reach", "unseen-subject", "hard")
-
-
-class UnknownRow(LookupError):
-    """A split has no row of that number."""
 
 
 class UnknownSplit(KeyError):
@@ -45,29 +41,20 @@ class DamagedSplit(ValueError):
     """A split cannot be read, or its content differs from its hash."""
 
 
-@dataclass(frozen=True, slots=True)
-class Split:
-    """A named list of cases; `digest`, the SHA-256 of its content, is its version. It is played on `track`.
-
-    `bottles` has one for each case, or none if all have the model's.
-    """
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Split(Rows):
+    """A named list of cases of a source of reaches; `digest`, the SHA-256 of its content, is its version."""
 
     name: str
     reaches: str
-    cases: tuple[Case, ...]
     digest: str
-    track: Track = PLAIN
-    bottles: tuple[Bottle, ...] = ()
 
     def case(self, row: int) -> Case:
         """The case of a row; raises UnknownRow."""
-        if not 0 <= row < len(self.cases):
-            raise UnknownRow(f"{self.name} of {self.reaches} reaches has rows 0 to {len(self.cases) - 1}, not {row}")
-        return self.cases[row]
-
-    def bottles_of(self, rows: Iterable[int]) -> list[Bottle]:
-        """The bottles of some rows; empty if all have the model's."""
-        return [self.bottles[row] for row in rows] if self.bottles else []
+        try:
+            return super(Split, self).case(row)  # A class with slots is made anew, so `super()` finds another.
+        except UnknownRow as error:
+            raise UnknownRow(f"{self.name} of {self.reaches} reaches: {error}") from None
 
 
 def known_splits(reaches: str) -> tuple[str, ...]:
@@ -103,7 +90,8 @@ def load_split(reaches: str, name: str) -> Split:
     rows, digest = _rows(_table(reaches, f"splits-{reaches}.parquet"), reaches, name)
     if track != PLAIN:
         digest = hashing.digest(f"{digest} {track}".encode())
-    return Split(whole_name, reaches, tuple(cases_from_frame(rows)), digest, track)
+    cases = tuple(cases_from_frame(rows))
+    return Split(name=whole_name, reaches=reaches, digest=digest, cases=cases, track=track)
 
 
 def splits_under(reaches: str, names: Sequence[str], track: str) -> list[str]:
@@ -126,7 +114,8 @@ def _load_with_bottles(reaches: str, name: str, track: Track) -> Split:
     if name not in (known := _splits_with_bottles(reaches)):
         raise UnknownSplit(name, reaches, known)
     rows, digest = _rows(_table(reaches, bottles_file(reaches)), reaches, name)
-    return Split(name, reaches, tuple(cases_from_frame(rows)), digest, track, tuple(bottle.from_frame(rows)))
+    cases, bottles = tuple(cases_from_frame(rows)), tuple(bottle.from_frame(rows))
+    return Split(name=name, reaches=reaches, digest=digest, cases=cases, track=track, bottles=bottles)
 
 
 def _splits_with_bottles(reaches: str) -> list[str]:

@@ -8,4 +8,4 @@ from dextron_bench.storage import hashing
 
 def random_order(split: Split) -> list[int]:
     """All row numbers of a split, sorted by the hash of the split's digest and the row."""
-    return sorted(range(len(split.cases)), key=lambda row: hashing.digest(f"{split.digest} {row}".encode()))
+    return sorted(range(len(split)), key=lambda row: hashing.digest(f"{split.digest} {row}".encode()))

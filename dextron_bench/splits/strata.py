@@ -34,13 +34,13 @@ def strata(split: Split) -> pd.DataFrame:
 def by_subject(split: Split, subject: str) -> tuple[Split, Split]:
     """The rows of a split with a subject's reaches, and all other rows, each with a digest of its own.
 
-    The split has no other bottles. Raises UnknownReach.
+    Raises UnknownReach.
     """
     subjects = strata(split)["subject"].to_numpy()
     parts = []
     for word, chosen in (("with", subjects == subject), ("without", subjects != subject)):
-        cases = tuple(case for case, is_in in zip(split.cases, chosen, strict=True) if is_in)
-        parts.append(replace(split, cases=cases, digest=hashing.digest(f"{split.digest} {word} {subject}".encode())))
+        part, digest = split.rows(np.flatnonzero(chosen)), hashing.digest(f"{split.digest} {word} {subject}".encode())
+        parts.append(replace(split, cases=part.cases, bottles=part.bottles, digest=digest))
     return parts[0], parts[1]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -11,9 +11,10 @@ import numpy as np
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import policies
-from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.experts.policies import Expert, ExpertAgent
 from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
+from dextron_bench.splits.rows import Rows
 from dextron_bench.success import metrics
 from dextron_bench.success.metrics import Metrics
 from dextron_bench.success.network import SuccessModel
@@ -38,19 +39,20 @@ class Evaluation:
         return overall | curves | {"predictions": counts}
 
 
-def with_random_experts(cases: Sequence[Case], seed: int = 0) -> list[Case]:
-    """Every case with the expert that solves it, then every case with a uniformly drawn expert: outcomes differ."""
-    rng = np.random.default_rng([seed, len(cases)])
-    gains, criticals = (rng.uniform(*bounds, len(cases)) for bounds in (policies.GAIN, policies.CRITICAL_DISTANCE))
+def with_random_experts(rows: Rows, seed: int = 0) -> Rows:
+    """Every row with the expert that solves it, then every row with a uniformly drawn expert: outcomes differ."""
+    rng = np.random.default_rng([seed, len(rows)])
+    gains, criticals = (rng.uniform(*bounds, len(rows)) for bounds in (policies.GAIN, policies.CRITICAL_DISTANCE))
     experts = [Expert(gain, critical) for gain, critical in zip(gains.tolist(), criticals.tolist(), strict=True)]
-    return [*cases, *(replace(case, expert=expert) for case, expert in zip(cases, experts, strict=True))]
+    drawn = (replace(case, expert=expert) for case, expert in zip(rows.cases, experts, strict=True))
+    return Rows(cases=(*rows.cases, *drawn), track=rows.track, bottles=2 * rows.bottles)
 
 
 def evaluate(
-    model: SuccessModel, source: Source, cases: Sequence[Case], agent: Agent | None = None, threads: int = 0
+    model: SuccessModel, source: Source, rows: Rows, agent: Agent | None = None, threads: int = 0
 ) -> Evaluation:
-    """Evaluates the model on every transition of an agent's episodes; without an agent, the cases' experts play."""
-    columns = [_predict(model, source, episode) for episode in _play(source, cases, agent, threads)]
+    """Evaluates the model on every transition of an agent's episodes; without an agent, the rows' experts play."""
+    columns = [_predict(model, source, episode) for episode in _play(source, rows, agent, threads)]
     chances, outcomes, times = (np.concatenate(column) for column in zip(*columns, strict=True))
     bins = np.minimum((times * TIME_BINS).astype(int), TIME_BINS)
     by_time = np.array([metrics.auc(chances[bins == k], outcomes[bins == k]) for k in range(TIME_BINS + 1)])
@@ -61,10 +63,10 @@ def _without_nan(values: np.ndarray) -> list[float | None]:
     return [None if value != value else value for value in values.tolist()]
 
 
-def _play(source: Source, cases: Sequence[Case], agent: Agent | None, threads: int) -> Iterator[Episode]:
-    """Episodes in the order of their cases."""
-    episodes = dict(rollout(agent or ExpertAgent(), source, cases, threads=threads))
-    yield from (episodes[row] for row in range(len(cases)))
+def _play(source: Source, rows: Rows, agent: Agent | None, threads: int) -> Iterator[Episode]:
+    """Episodes in the order of their rows."""
+    episodes = dict(rollout(agent or ExpertAgent(), source, rows, threads=threads))
+    yield from (episodes[row] for row in range(len(rows)))
 
 
 def _predict(model: SuccessModel, source: Source, episode: Episode) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, ExpertAgent
 from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
+from dextron_bench.splits.rows import Rows
 from dextron_bench.success.network import SuccessModel
 from dextron_bench.success.predict import predict
 from dextron_bench.world.model import CONTROL_STEP
@@ -63,12 +64,12 @@ def predict_episode(model: SuccessModel, source: Source, case: Case, player: str
 
 
 def play_and_predict(
-    model: SuccessModel, source: Source, cases: Sequence[Case], policies: Mapping[str, Agent], threads: int = 0
+    model: SuccessModel, source: Source, rows: Rows, policies: Mapping[str, Agent], threads: int = 0
 ) -> Iterator[PredictedEpisode]:
-    """Plays experts and then each named policy on the same cases, and predicts every episode."""
+    """Plays experts and then each named policy on the same rows, and predicts every episode."""
     for player, agent in {EXPERT: ExpertAgent(), **policies}.items():
-        episodes = dict(rollout(agent, source, cases, threads=threads))
-        for row, case in enumerate(cases):
+        episodes = dict(rollout(agent, source, rows, threads=threads))
+        for row, case in enumerate(rows.cases):
             yield predict_episode(model, source, case, player, episodes[row])
 
 

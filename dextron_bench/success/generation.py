@@ -18,6 +18,7 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import CRITICAL_DISTANCE, GAIN, Case, Expert, ExpertAgent
 from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Setting, Source
+from dextron_bench.splits.rows import Rows
 from dextron_bench.storage import folder_config, tensors
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.success import block_pieces, dataset
@@ -164,7 +165,7 @@ def play_block(
     """
     agent = agents[config.policy(number)] if config.kind(number) == POLICY else ExpertAgent()
     cases = draw_cases(source, train, config, number)
-    played = dict(rollout(agent, source, cases, threads=threads))
+    played = dict(rollout(agent, source, Rows(cases=tuple(cases)), threads=threads))
     episodes = [played[row] for row in range(len(cases))]
     solved = np.array([episode.score == task.SUCCESS for episode in episodes], np.uint8)
     arrays = {

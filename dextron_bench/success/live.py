@@ -11,9 +11,10 @@ import numpy as np
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.experts.policies import Case, Expert, ExpertAgent
+from dextron_bench.experts.policies import Expert, ExpertAgent
 from dextron_bench.methods.agents import Agent, Privileged
 from dextron_bench.reaches.setting import Source
+from dextron_bench.splits.rows import Rows
 from dextron_bench.success.network import GRID, SuccessModel
 from dextron_bench.world.model import CONTROL_STEP
 
@@ -31,13 +32,14 @@ class Observer(Protocol):
 
 
 def play(
-    agent: Agent, source: Source, case: Case, model: SuccessModel, observer: Observer, speed: float = 1.0
+    agent: Agent, source: Source, row: Rows, model: SuccessModel, observer: Observer, speed: float = 1.0
 ) -> Episode:
-    """Plays an episode and shows it to an observer, `speed` times as fast as real time; 0 means without waiting."""
+    """Plays one row and shows it to an observer, `speed` times as fast as real time; 0 means without waiting."""
+    (case,) = row.cases
     duration = source.duration(case.setting) / CONTROL_STEP
     step_seconds = CONTROL_STEP / speed if speed else 0.0
     observed = _ObservedAgent(agent, case.expert, model, duration, observer, step_seconds)
-    ((_, episode),) = rollout(observed, source, [case], slots=1, threads=1)
+    ((_, episode),) = rollout(observed, source, row, slots=1, threads=1)
     observer.close(episode.actions, observed.predictions, episode.success)
     return episode
 

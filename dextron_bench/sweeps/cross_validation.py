@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.experts.policies import Case
 from dextron_bench.methods.learners import PolicyTransfer
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import Setting
@@ -20,6 +19,7 @@ from dextron_bench.runs import execution
 from dextron_bench.runs.plans import Plan, Run, resolve
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import Split, load_split
+from dextron_bench.splits.rows import Rows
 from dextron_bench.storage import atomic, hashing, schemas
 from dextron_bench.storage.run_folder import RunFolder, runs_without
 from dextron_bench.sweeps.execution import Resources
@@ -82,18 +82,18 @@ def _scores(run: Run, subject: str, held_out: Split, job: TrainingJob | None, re
         stored = schemas.read(folder.left_out, schemas.LEFT_OUT)
         if stored["depends on"] == depends:
             return stored
-    cases = _once(held_out)
+    rows = _once(held_out)
     source, agent = sources.open_source(run.source), execution.agent(run, weights)
-    episodes = dict(rollout(agent, source, cases, threads=resources.threads))
+    episodes = dict(rollout(agent, source, rows, threads=resources.threads))
     failed = sum(bool(episode.failure) for episode in episodes.values())
-    content = {"depends on": depends, "scores": [episodes[row].score for row in range(len(cases))], "failed": failed}
+    content = {"depends on": depends, "scores": [episodes[row].score for row in range(len(rows))], "failed": failed}
     atomic.write_json(folder.left_out, content)
     return content
 
 
-def _once(split: Split) -> list[Case]:
-    """A case for each setting, the first one."""
-    cases: dict[Setting, Case] = {}
-    for case in split.cases:
-        cases.setdefault(case.setting, case)
-    return list(cases.values())
+def _once(split: Split) -> Rows:
+    """A row for each setting, the first one."""
+    rows: dict[Setting, int] = {}
+    for row, case in enumerate(split.cases):
+        rows.setdefault(case.setting, row)
+    return split.rows(rows.values())

@@ -112,10 +112,9 @@ class Follower:
         val = load_split(self._files.reaches, "val")
         if val.digest != evaluation.digest:
             return []
-        settings = [case.setting for case in val.cases[: len(evaluation.actions)]]
-        source = open_source(self._files.reaches)
-        episodes = dict(replay(source, settings, evaluation.actions, threads=1))
-        return [episodes[row] for row in range(len(settings)) if len(episodes[row].actions)]
+        rows, source = val.first(len(evaluation.actions)), open_source(self._files.reaches)
+        episodes = dict(replay(source, rows, evaluation.actions, threads=1))
+        return [episodes[row] for row in range(len(rows)) if len(episodes[row].actions)]
 
     def _pass_on(self, show: Callable[[Any], None], what: Any) -> bool:
         """Calls the tracker, whose code may raise anything; True if it did not raise."""

@@ -57,13 +57,13 @@ class Curve:
     def best(self, seed: int) -> int:
         """The epoch of the finalist with the highest mean on all of `val`; the latest if several are equal."""
         ranked = sorted((mean(self._scores(epoch, seed, POINT_ROWS)), epoch) for epoch in self._checkpoints.epochs())
-        rows = len(self._val.cases)
+        rows = len(self._val)
         finals = [(mean(self._scores(epoch, seed, rows)), epoch) for _, epoch in ranked[-FINALISTS:]]
         return max(finals)[1]
 
     def _scores(self, epoch: int, seed: int, rows: int) -> list[float]:
         """Scores on the first rows of `val`."""
-        rows = min(rows, len(self._val.cases))
+        rows = min(rows, len(self._val))
         snapshot = self._checkpoints.snapshot(epoch, seed)
         file = snapshot.with_name(f"{snapshot.stem}-val{rows}.json")
         if file not in self._cache:
@@ -94,9 +94,8 @@ class Curve:
             raise DamagedFile(snapshot, error) from error
         with as_agent_error(f"policy() of method {self._learner.name!r}"):
             agent = self._learner.policy(weights)
-        cases = self._val.cases[:rows]
         scores, actions = dict[int, float](), dict[int, list[float]]()
-        for row, episode in rollout(agent, self._source, cases, threads=self._threads):
+        for row, episode in rollout(agent, self._source, self._val.first(rows), threads=self._threads):
             scores[row] = episode.score
             if row < SHOWN_ROWS:
                 actions[row] = episode.actions[:, 0].tolist()

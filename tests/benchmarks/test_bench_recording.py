@@ -47,7 +47,7 @@ class Workbench:
 
     def keep(self) -> None:
         """Writes the table of a run, which is sufficient to replay each episode."""
-        split = Split("test", self.source.name, tuple(self.cases), "")
+        split = Split(name="test", reaches=self.source.name, digest="", cases=tuple(self.cases))
         rows = [episode_table.row(split, index, self.episodes[index]) for index in range(len(self.cases))]
         run_files.store_episodes(RunFolder(self.folder), pd.DataFrame(rows))
 

@@ -104,7 +104,7 @@ def test_each_setting_counts_once():
     first, second = Setting("a", 0.0, 0.0, 0.0), Setting("b", 0.0, 0.0, 0.0)
     rows = [(first, 0.1), (second, 0.2), (first, 0.3)]
     cases = tuple(Case(setting, Expert(1.0, critical), 0.1) for setting, critical in rows)
-    assert cross_validation._once(Split("train", "synthetic", cases, "0")) == list(cases[:2])
+    assert cross_validation._once(Split(name="train", reaches="synthetic", digest="0", cases=cases)).cases == cases[:2]
 
 
 def test_an_error_is_one_line(here: Path, complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch):

@@ -12,10 +12,12 @@ from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS
 from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.splits.rows import Rows
 from dextron_bench.world import model, task
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASE = Case(SETTINGS[0], Expert(1.2, 0.3), 0.1)
+ROW = Rows(cases=(CASE,))
 
 
 def episode(monkeypatch: pytest.MonkeyPatch, closures: list[float], actions: list[float], score: float) -> Episode:
@@ -64,9 +66,9 @@ def test_a_hand_that_never_closes_has_no_choice(monkeypatch: pytest.MonkeyPatch)
 
 def test_the_choice_of_an_agent_that_closes_once_is_its_first_closing_action_and_its_window_predicts_it():
     """`reflex` opens and closes at full speed, as a fork does, so the window says how its episode ends."""
-    window = closing_windows.play_windows(SOURCE, {7: CASE}, threads=1)[7]
+    window = closing_windows.play_windows(SOURCE, ROW, threads=1)[0]
     for near in (0.065, 0.15):
-        choice = closing_windows.play_choices(Reflex(near).agent(0), SOURCE, {7: CASE}, threads=1)[7]
+        choice = closing_windows.play_choices(Reflex(near).agent(0), SOURCE, ROW, threads=1)[0]
         ((_, played),) = rollout(Reflex(near).agent(0), SOURCE, [CASE], threads=1)
         assert choice.time == pytest.approx(0.02 * int(np.argmax(played.actions[:, 0] > 0.0)))
         nearest = int(np.argmin(np.abs(window.times - choice.time)))

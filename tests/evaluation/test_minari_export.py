@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from tests.helpers.short_reaches import SETTINGS, SOURCE
 minari = pytest.importorskip("minari", reason="Minari is not installed: pip install -e '.[minari]'")
 
 CASES = tuple(Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS[:3])
-SPLIT = Split("train", "synthetic", CASES, "5a5a")
+SPLIT = Split(name="train", reaches="synthetic", digest="5a5a", cases=CASES)
 EXPERT, STILL = (
     minari_export.Player("expert", ExpertAgent()),
     minari_export.Player("nothing", Nothing().agent(0), {"sha256": "0f"}),
@@ -133,7 +134,7 @@ def test_a_failed_export_raises_and_leaves_nothing(tmp_path: Path, monkeypatch: 
 def test_a_policy_learned_from_the_data_set_beats_the_mean_action_on_other_episodes(tmp_path: Path):
     rng = np.random.default_rng(0)
     cases = tuple(Case(SOURCE.sample(rng), Expert(1.2, 0.4), 0.0) for _ in range(20))
-    loaded = write(tmp_path, [EXPERT], Split("train", "synthetic", cases, "5a5a"), len(cases))
+    loaded = write(tmp_path, [EXPERT], replace(SPLIT, cases=cases), len(cases))
     train, held_out = minari.split_dataset(loaded, sizes=[15, 5], seed=0)
     (x, y), (test_x, test_y) = transitions(train), transitions(held_out)
     mean, deviation = x.mean(0), x.std(0) + 1e-6

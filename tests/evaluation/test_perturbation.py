@@ -13,6 +13,7 @@ from dextron_bench.evaluation.perturbation import FINGERS, Perturbation, with_er
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.splits.rows import Rows
 from dextron_bench.splits.tracks import PLAIN, TRACKS, Noise, Track
 from dextron_bench.world import model
 from dextron_bench.world.bottle import Bottle
@@ -41,8 +42,8 @@ class Watcher:
 
 
 def played(track: Track, slots: int = 8, cases: list[Case] = CASES) -> dict[int, Episode]:
-    bottles = [HEAVY[CASES.index(case)] for case in cases] if track.bottle else []
-    return dict(rollout(Watcher(), SOURCE, cases, slots, 1, track, bottles))
+    bottles = tuple(HEAVY[CASES.index(case)] for case in cases) if track.bottle else ()
+    return dict(rollout(Watcher(), SOURCE, Rows(cases=tuple(cases), track=track, bottles=bottles), slots, 1))
 
 
 def test_actions_arrive_after_the_delay():
@@ -57,11 +58,13 @@ def test_actions_arrive_after_the_delay():
 
 def test_episodes_under_a_delay_have_the_actions_that_arrived_and_are_replayed_exactly():
     agent = Watcher()
-    [(_, episode)] = rollout(agent, SOURCE, CASES[:1], 1, 1, TRACKS["delay-100"])
+    row = Rows(cases=(CASES[0],), track=TRACKS["delay-100"])
+    [(_, episode)] = rollout(agent, SOURCE, row, 1, 1)
     assert (episode.actions[:5] == 0.0).all()
     np.testing.assert_array_equal(episode.actions[5:, 0], np.concatenate(agent.sent)[: len(episode.actions) - 5, 0])
-    [(_, again)] = replay(SOURCE, [episode.setting], [episode.actions[:, 0]])
-    np.testing.assert_array_equal(again.states, episode.states)
+    for played in (row, [episode.setting]):  # Stored actions are those that arrived: the delay does not count twice.
+        [(_, again)] = replay(SOURCE, played, [episode.actions[:, 0]])
+        np.testing.assert_array_equal(again.states, episode.states)
     assert again.score == episode.score
 
 
@@ -119,7 +122,8 @@ def test_a_lost_reading_repeats_the_last_one():
 
 def test_the_agent_sees_the_errors_but_the_episode_has_none():
     agent = Watcher()
-    [(_, episode)] = rollout(agent, SOURCE, CASES[:1], 1, 1, Track("t", noise=replace(STRONG, lost=0.0)))
+    noisy = Rows(cases=(CASES[0],), track=Track("t", noise=replace(STRONG, lost=0.0)))
+    [(_, episode)] = rollout(agent, SOURCE, noisy, 1, 1)
     seen = np.concatenate(agent.seen)
     assert (seen[:, 7:10] != episode.states[: len(seen), 7:10]).all()
     np.testing.assert_allclose((seen[:, 7:10] - episode.states[: len(seen), 7:10]).std(), 0.01, rtol=0.2)

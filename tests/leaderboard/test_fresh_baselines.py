@@ -25,7 +25,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     def draw(reaches: str, name: str, seed: int, *_: object) -> Split:
         names.append(name)
         table = rows.assign(window=0.0, duration_noise=rows["duration_noise"] + seed % 7 / 1000)
-        return Split(name, reaches, tuple(cases_from_frame(table)), split_digest(table))
+        return Split(name=name, reaches=reaches, digest=split_digest(table), cases=tuple(cases_from_frame(table)))
 
     monkeypatch.setattr(fresh, "draw", draw)
     return names

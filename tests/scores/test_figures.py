@@ -76,7 +76,8 @@ def test_windows_are_drawn_also_for_settings_that_never_work_and_for_hands_that_
         5: Window(np.array([2.0]), np.array([False])),
         8: Window(never, never.astype(bool)),
     }
-    choices = {"rule": {3: Choice(1.04, True), 5: Choice(2.0, False), 8: Choice(np.nan, False)}}
+    unseen, by_row = Choice(0.0, True), {3: Choice(1.04, True), 5: Choice(2.0, False), 8: Choice(np.nan, False)}
+    choices = {"rule": [by_row.get(row, unseen) for row in range(9)]}
     drawn: list[Figure] = []
     monkeypatch.setattr(episodes, "save", lambda figure, file, dpi: drawn.append(figure))
     episodes.windows(windows, choices, "title", tmp_path / "windows.svg")

@@ -95,7 +95,7 @@ def test_the_tables_are_read_as_splits(tmp_path: Path, monkeypatch: pytest.Monke
     split = loading.load_split("synthetic", "test+bottle-radius")
     assert len(split.bottles) == len(split.cases) == 40
     assert split.track.name == "bottle-radius"
-    assert split.bottles_of([3]) == [split.bottles[3]]
+    assert split.rows([3]).bottles == (split.bottles[3],)
     assert split.bottles[3].mass == model_bottle().mass
     assert {name: len(loading.load_split("synthetic", name).digest) for name in entries} == dict.fromkeys(entries, 64)
     with pytest.raises(loading.UnknownSplit, match=r"choose from test\+bottle-friction"):

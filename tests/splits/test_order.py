@@ -11,7 +11,7 @@ CASE = Case(Setting("a", 0.0, 0.0, 0.0), Expert(1.0, 0.1), 0.1)
 
 
 def split(digest: str) -> Split:
-    return Split("test", "synthetic", (CASE,) * 10, digest)
+    return Split(name="test", reaches="synthetic", digest=digest, cases=(CASE,) * 10)
 
 
 def test_the_order_has_every_row_once_and_is_frozen():

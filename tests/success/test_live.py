@@ -18,11 +18,13 @@ from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.recording import viewer
+from dextron_bench.splits.rows import Rows
 from dextron_bench.success import live
 from dextron_bench.success.network import SIZES, SuccessModel
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASE = Case(SETTINGS[0], Expert(1.4, 0.17), 0.1)
+ROW = Rows(cases=(CASE,))
 RNG = np.random.default_rng(0)
 LAYERS = {f"layer.{i}": RNG.normal(size=shape) / shape[-1] ** 0.5 for i, shape in enumerate(SIZES)}
 MODEL = SuccessModel(LAYERS | {"mean": np.zeros(48), "deviation": np.ones(48)})
@@ -50,7 +52,7 @@ def rolled_out() -> Episode:
 
 def test_every_step_is_shown_as_it_is_taken():
     recorder, episode = Recorder(), rolled_out()
-    assert live.play(ExpertAgent(), SOURCE, CASE, MODEL, recorder, speed=0).states.tobytes() == episode.states.tobytes()
+    assert live.play(ExpertAgent(), SOURCE, ROW, MODEL, recorder, speed=0).states.tobytes() == episode.states.tobytes()
     assert len(recorder.shown) == len(episode.actions)
     for step, (states, actions, predictions) in enumerate(recorder.shown, start=1):
         np.testing.assert_array_equal(states, episode.states[:step])
@@ -80,7 +82,7 @@ def test_a_closed_viewer_is_an_error_before_the_next_episode(monkeypatch: pytest
 def test_the_live_view_draws_all_steps(tmp_path: Path):
     file, episode = tmp_path / "live.rrd", rolled_out()
     view = recording.LiveView(lambda stream: stream.save(file), "live", SOURCE.path(CASE.setting), {"method": "exp"})
-    live.play(ExpertAgent(), SOURCE, CASE, MODEL, view, speed=0)
+    live.play(ExpertAgent(), SOURCE, ROW, MODEL, view, speed=0)
     chunks = [chunk for chunk in RrdReader(file).store().stream().to_chunks() if not chunk.is_static]
     entities = {str(chunk.entity_path) for chunk in chunks}
     assert {"/world/palm", "/world/bottle", "/success/curve", "/success/chosen", "/ridge/now"} <= entities

@@ -59,10 +59,10 @@ def checks(
 
 
 def _play(launch: Launch, reaches: str, limits: Limits, threads: int) -> list[Episode]:
-    cases = load_split(reaches, "val").cases[:EPISODES]
+    rows = load_split(reaches, "val").first(EPISODES)
     with IsolatedAgent(launch, 0, limits) as agent:
-        episodes = dict(rollout(agent, sources.open_source(reaches), cases, threads=threads))
-    return [episodes[place] for place in range(len(cases))]
+        episodes = dict(rollout(agent, sources.open_source(reaches), rows, threads=threads))
+    return [episodes[place] for place in range(len(rows))]
 
 
 def _form_check(episodes: Sequence[Episode]) -> Check:

@@ -31,7 +31,7 @@ def read(file: Path, splits: Sequence[Split]) -> pd.DataFrame:
     """The table in a file, which a separate process reads and checks; raises BadBundle, OSError."""
     with file.open("rb"):  # Raises OSError here, if the file cannot be read.
         pass
-    rows = sum(len(split.cases) for split in splits)
+    rows = sum(len(split) for split in splits)
     limits = json.dumps({"rows": rows, "groups": GROUPS, "text": TEXT, "longest": LONGEST, "lists": LISTS})
     done = limited_process.run(table_process.__file__, [str(file), limits], b"", MEMORY, SECONDS)
     if done.code == 1 and done.output:
@@ -62,10 +62,10 @@ def _faults(rows: pd.DataFrame, split: Split) -> Iterator[str]:
     counts = rows["row"].value_counts()
     if duplicates := sorted(counts[counts > 1].index):
         yield f"row {duplicates[0]} appears {counts[duplicates[0]]} times"
-    if missing := sorted(set(range(len(split.cases))) - set(counts.index)):
+    if missing := sorted(set(range(len(split))) - set(counts.index)):
         yield f"row {missing[0]} is missing"
-    for row in rows[rows["row"].between(0, len(split.cases) - 1)].itertuples():
-        setting = split.cases[row.row].setting  # pyright: ignore[reportArgumentType, reportCallIssue]
+    for row in rows[rows["row"].between(0, len(split) - 1)].itertuples():
+        setting = split.case(row.row).setting  # pyright: ignore[reportArgumentType, reportCallIssue]
         if tuple(getattr(row, name) for name in SETTING) != tuple(getattr(setting, name) for name in SETTING):
             yield f"row {row.row} has another setting than the split"
         actions = np.asarray(row.actions, float)

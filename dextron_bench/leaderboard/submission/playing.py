@@ -78,14 +78,14 @@ def play_shuffled(
     """Plays a split with an agent in a separate process, in the order of `row_order`; yields rows and episodes."""
     rows = row_order(split, seed)
     with IsolatedAgent(launch, seed, limits) as agent:
-        for place, episode in rollout(agent, source, [split.cases[row] for row in rows], threads=threads):
+        for place, episode in rollout(agent, source, split.rows(rows), threads=threads):
             yield int(rows[place]), episode
 
 
 def row_order(split: Split, seed: int) -> np.ndarray:
     """The row numbers of a split in the order in which a submission with this seed plays them."""
     digest = hashing.digest(split.digest.encode(), str(seed).encode())
-    return np.random.default_rng(int(digest, 16)).permutation(len(split.cases))
+    return np.random.default_rng(int(digest, 16)).permutation(len(split))
 
 
 def write_bundle(entry: Entry, folder: Path, file: Path) -> dict[str, Any]:

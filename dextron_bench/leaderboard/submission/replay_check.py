@@ -70,8 +70,8 @@ def _played(
     """For each row: its split, its number, the claims of the table, and the episode of the replay."""
     for split in splits:
         rows = table[table["split"] == split.name].sort_values("row").to_dict("records")
-        settings = [split.cases[row["row"]].setting for row in rows]
-        for place, episode in replay(source, settings, [np.asarray(row["actions"], float) for row in rows], threads):
+        actions = [np.asarray(row["actions"], float) for row in rows]
+        for place, episode in replay(source, split.rows(row["row"] for row in rows), actions, threads):
             claimed = {str(name): value for name, value in rows[place].items()}
             if claimed["failure"] and episode.failure:  # The agent failed at the end of its actions.
                 episode = replace(episode, failure=claimed["failure"])

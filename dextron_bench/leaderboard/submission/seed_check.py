@@ -72,7 +72,7 @@ class SeedCheck:
         """Runs the agent again and compares its episodes with the replayed ones."""
         finding, differing = SeedFinding(self._seed), []
         source = sources.open_source(self._manifest["reaches"])
-        total, done = sum(len(split.cases) for split in self._splits), 0
+        total, done = sum(len(split) for split in self._splits), 0
         try:
             launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, how.trust)
             for split in self._splits:
@@ -90,10 +90,10 @@ class SeedCheck:
         """The table of the agent's episodes on fresh settings; raises AgentError, BadBundle."""
         source, rows = sources.open_source(self._manifest["reaches"]), []
         launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, how.trust)
-        total = sum(len(split.cases) for split in splits)
+        total = sum(len(split) for split in splits)
         for split in splits:
             for row, episode in playing.play_shuffled(launch, source, split, self._seed, how.limits, how.threads):
-                expert = split.cases[row].expert
+                expert = split.case(row).expert
                 rows.append(episode_table.row(split, row, episode) | asdict(expert))
                 how.report(len(rows), total, f"seed {self._seed}, fresh settings")
         return pd.DataFrame(rows).sort_values(["split", "row"], ignore_index=True)

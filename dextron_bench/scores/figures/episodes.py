@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,7 +46,7 @@ def ridges(episodes: dict[str, PredictedEpisode], file: Path) -> None:
     save(figure, file, 150)
 
 
-def windows(windows: Mapping[int, Window], choices: Mapping[str, Mapping[int, Choice]], title: str, file: Path) -> None:
+def windows(windows: Mapping[int, Window], choices: Mapping[str, Sequence[Choice]], title: str, file: Path) -> None:
     """Draws a bar for each row of a split, green while closing works, with a marker where each agent began to close.
 
     Settings are in the order in which closing begins to work, and 0 s is the first moment that was tried. A filled

@@ -36,7 +36,7 @@ def draw(reaches: str, name: str, seed: int, *_: object) -> Split:
     """Instead of a search: two settings that an expert solves, with noise that follows from the seed."""
     rows = pd.DataFrame([("-", *one) for one in tiny_benchmark.SOLVED], columns=tiny_benchmark.COLUMNS)
     table = rows.assign(window=0.0, duration_noise=rows["duration_noise"] + seed % 7 / 1000)
-    return Split(name, reaches, tuple(cases_from_frame(table)), split_digest(table))
+    return Split(name=name, reaches=reaches, digest=split_digest(table), cases=tuple(cases_from_frame(table)))
 
 
 @pytest.fixture

@@ -27,7 +27,8 @@ def test_equal_submissions_have_equal_bytes_and_nothing_is_played_twice(submitte
 
 
 def test_episodes_are_played_in_an_order_that_depends_on_split_and_seed():
-    split = Split("test", "synthetic", tuple(cases_from_frame(tiny_benchmark.ROWS)) * 20, "0" * 64)
+    cases = tuple(cases_from_frame(tiny_benchmark.ROWS)) * 20
+    split = Split(name="test", reaches="synthetic", digest="0" * 64, cases=cases)
     first, second = playing.row_order(split, 0), playing.row_order(split, 1)
     assert sorted(first) == list(range(len(split.cases)))
     assert list(first) != list(range(len(first)))
