@@ -50,10 +50,12 @@ class Export:
     def __call__(self) -> int:
         from dextron_bench.evaluation import minari_export
         from dextron_bench.reaches.sources import open_source
+        from dextron_bench.splits import tracks
         from dextron_bench.splits.loading import load_split
 
         split = load_split(self.reaches, self.split)
-        name = self.name or f"dextron/{self.reaches}-{self.split}-{'policies' if self.weights else 'experts'}-v0"
+        played = f"{self.reaches}-{self.split.replace(tracks.PLUS, '-')}"  # Minari's names have no +.
+        name = self.name or f"dextron/{played}-{'policies' if self.weights else 'experts'}-v0"
         rows = min(self.rows, len(split))
         export = minari_export.Export(name, split, rows, self._players(), self.author or minari_export.CONTRIBUTORS)
         with progress_bar("episodes", self.quiet) as progress:

@@ -61,7 +61,7 @@ class Data:
         files = {hashing.sha256(file): file for file in self.policies}
         agents = {name: weights.load_agent_from_file(file) for name, file in files.items()}
         config = generation.DatasetConfig(self.reaches, self.seed, tuple(agents))
-        source, train = open_source(self.reaches), load_split(self.reaches, "train").cases
+        source, train = open_source(self.reaches), load_split(self.reaches, "train")
         folder = folder_of(self.runs, self.reaches, self.seed)
         if share is not None:
             with progress_bar(f"blocks of share {share}", self.quiet) as progress:

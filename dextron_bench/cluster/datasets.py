@@ -59,6 +59,6 @@ def play_block(runs: Path, threads: int, config: DatasetConfig, number: int, fol
     place = runs / folder
     content = generation.write_or_check_config(place, config, rows)
     agents = {name: weights.load_agent_from_file(runs / POLICIES / name) for name in config.policies}
-    train, file = load_split(config.reaches, "train").cases, block_pieces.file_of(place, number)
+    train, file = load_split(config.reaches, "train"), block_pieces.file_of(place, number)
     generation.play_block(open_source(config.reaches), train, config, number, agents, threads, file)
     return [file, block_pieces.write_stamp(place, content, number)]

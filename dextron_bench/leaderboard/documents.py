@@ -97,8 +97,8 @@ def _values(board: Path) -> Callable[[str], str]:
             case ["split", reaches, name, "rows"]:
                 return f"{len(load_split(reaches, name)):,}"
             case ["split", reaches, name, "narrow"]:
-                cases = load_split(reaches, name).cases
-                return f"{100 * sum(case.window <= hard.WINDOW for case in cases) / len(cases):.1f}"
+                split = load_split(reaches, name)
+                return f"{100 * sum(case.window <= hard.WINDOW for case in split.cases) / len(split):.1f}"
             case [method, reaches, split, "seeds"]:
                 return _of_seeds(results(), method, reaches, split)
             case [method, reaches, split, name]:

@@ -30,7 +30,7 @@ class Rows:
             raise ValueError(f"{len(self)} cases cannot have {len(self.bottles)} bottles")
 
     def __len__(self) -> int:
-        return len(self)
+        return len(self.cases)
 
     def case(self, row: int) -> Case:
         """The case of a row; raises UnknownRow."""

@@ -7,7 +7,7 @@ generation continues with the next block, and memory never holds the whole data 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -82,20 +82,20 @@ class Tally:
         return Tally(self.rows + other.rows, self.episodes + other.episodes, self.solved + other.solved)
 
 
-def draw_cases(source: Source, train: Sequence[Case], config: DatasetConfig, number: int) -> list[Case]:
-    """The cases of a block's episodes. All their reaches occur in `train`, the cases of that split."""
+def draw_rows(source: Source, train: Rows, config: DatasetConfig, number: int) -> Rows:
+    """The rows that a block plays. All their reaches occur in `train`, the split of that name."""
     rng = np.random.default_rng([config.seed, number])
     if config.kind(number) != UNIFORM:
-        return [train[row] for row in rng.integers(len(train), size=config.block)]
-    names = frozenset(case.setting.reach for case in train)
+        return train.rows(rng.integers(len(train), size=config.block).tolist())
+    names = frozenset(case.setting.reach for case in train.cases)
     gains, criticals = (rng.uniform(*bounds, config.block).tolist() for bounds in (GAIN, CRITICAL_DISTANCE))
     experts = [Expert(gain, critical) for gain, critical in zip(gains, criticals, strict=True)]
-    return [Case(_draw_setting(source, names, rng), expert, 0.0) for expert in experts]
+    return Rows(cases=tuple(Case(_draw_setting(source, names, rng), expert, 0.0) for expert in experts))
 
 
 def generate(
     source: Source,
-    train: Sequence[Case],
+    train: Rows,
     config: DatasetConfig,
     folder: Path,
     rows: int,
@@ -151,7 +151,7 @@ def write_or_check_config(folder: Path, config: DatasetConfig, rows: int) -> dic
 
 def play_block(
     source: Source,
-    train: Sequence[Case],
+    train: Rows,
     config: DatasetConfig,
     number: int,
     agents: Mapping[str, Agent],
@@ -164,9 +164,9 @@ def play_block(
     from `starts[k]` to before `starts[k + 1]`, one for each of its actions.
     """
     agent = agents[config.policy(number)] if config.kind(number) == POLICY else ExpertAgent()
-    cases = draw_cases(source, train, config, number)
-    played = dict(rollout(agent, source, Rows(cases=tuple(cases)), threads=threads))
-    episodes = [played[row] for row in range(len(cases))]
+    rows = draw_rows(source, train, config, number)
+    played = dict(rollout(agent, source, rows, threads=threads))
+    episodes = [played[row] for row in range(len(rows))]
     solved = np.array([episode.score == task.SUCCESS for episode in episodes], np.uint8)
     arrays = {
         "states": np.concatenate([episode.states[:-1] for episode in episodes]).astype(np.float32),

@@ -35,7 +35,7 @@ def play(
     agent: Agent, source: Source, row: Rows, model: SuccessModel, observer: Observer, speed: float = 1.0
 ) -> Episode:
     """Plays one row and shows it to an observer, `speed` times as fast as real time; 0 means without waiting."""
-    (case,) = row.cases
+    case = row.case(0)
     duration = source.duration(case.setting) / CONTROL_STEP
     step_seconds = CONTROL_STEP / speed if speed else 0.0
     observed = _ObservedAgent(agent, case.expert, model, duration, observer, step_seconds)

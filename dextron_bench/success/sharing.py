@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
-from dextron_bench.experts.policies import Case
 from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
+from dextron_bench.splits.rows import Rows
 from dextron_bench.storage import shares
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.shares import MissingPieces, Share, blocks_needed
@@ -19,7 +19,7 @@ from dextron_bench.success.generation import DatasetConfig
 
 def generate_share(
     source: Source,
-    train: Sequence[Case],
+    train: Rows,
     config: DatasetConfig,
     folder: Path,
     rows: int,

@@ -9,7 +9,6 @@ from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.world.bottle import Bottle
 from tests.helpers.short_reaches import SETTINGS, TORN, TORN_POSE, TornSource
 from tests.helpers.short_reaches import SOURCE as SHORT
 
@@ -152,20 +151,15 @@ def test_descriptions_of_faults():
     ("arguments", "error", "message"),
     [
         ({"source": "minjerk"}, TypeError, "must be a source of reaches, as open_source"),
-        ({"cases": [CASES[0].setting]}, TypeError, "cases must be of type Case"),
+        ({"rows": [CASES[0].setting]}, TypeError, "rows must be a split, or have the type Case"),
         ({"slots": 0}, ValueError, "slots must be an integer of at least 1; got 0"),
         ({"slots": 1.5}, ValueError, "slots must be an integer of at least 1; got 1.5"),
         ({"threads": "2"}, TypeError, "threads must be an integer, 0 for one per processor; got '2'"),
-        (
-            {"bottles": [Bottle(0.5, 1.0, 0.025)]},
-            ValueError,
-            "bottles must have one for each of 3 cases, or none; got 1",
-        ),
     ],
 )
 def test_arguments_of_another_form_are_refused_before_the_first_episode(arguments, error, message):
     with pytest.raises(error, match=message):
-        rollout(Sends(0.0), **({"source": SOURCE, "cases": CASES} | arguments))
+        rollout(Sends(0.0), **({"source": SOURCE, "rows": CASES} | arguments))
 
 
 def test_cases_may_come_from_a_generator():

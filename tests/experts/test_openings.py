@@ -65,13 +65,13 @@ def test_decisions_between_a_success_and_a_failure_are_tried_and_others_taken_to
     truth = np.array([char == "+" for char in "--++++-+++-++"])
     tried: list[int] = []
 
-    def close(engine: Engine, paths: list, starts: dict[str, np.ndarray]) -> np.ndarray:
+    def close(engine: Engine, begin: openings.Begin, episode: np.ndarray, starts: dict[str, np.ndarray]) -> np.ndarray:
         tried.extend(starts["row"].tolist())
         return np.where(truth[starts["row"]], 20.0, 3.0)
 
     monkeypatch.setattr(openings, "_close", close)
     episode = np.repeat([0, 1], [8, 5])
-    outcomes = openings._try(None, ["a", "b"], episode, {"row": np.arange(13)})  # type: ignore[arg-type]
+    outcomes = openings._try(None, None, episode, {"row": np.arange(13)})  # type: ignore[arg-type]
     assert tried == [0, 3, 6, 8, 11, 1, 2, 4, 5, 12]
     # Row 7 follows the failure of row 6, and nothing is tried after it; rows 9 and 10 lie between two successes.
     assert "".join("-+"[outcome] for outcome in outcomes) == "--++++--+++++"

@@ -31,13 +31,15 @@ ROWS = pd.DataFrame(
 COMMAND = Path(__file__).with_name("tiny_command.py")
 
 
-def write(folder: Path, rows: pd.DataFrame = ROWS) -> Path:
-    """Writes the catalogue and the table of the splits into a folder; returns the folder."""
+def write(folder: Path, rows: pd.DataFrame = ROWS, table: str = f"splits-{NAME}.parquet") -> Path:
+    """Writes a table of splits into a folder, and adds them to its catalogue; returns the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    rows.to_parquet(folder / f"splits-{NAME}.parquet")
+    rows.to_parquet(folder / table)
     groups = rows.groupby("split", sort=False)
     entry = {str(name): {"rows": len(group), "digest": split_digest(group)} for name, group in groups}
-    (folder / "splits.json").write_text(json.dumps({NAME: entry}))
+    catalogue = folder / "splits.json"
+    known = json.loads(catalogue.read_text())[NAME] if catalogue.exists() else {}
+    catalogue.write_text(json.dumps({NAME: known | entry}))
     return folder
 
 

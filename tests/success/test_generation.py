@@ -9,6 +9,7 @@ import pytest
 
 from baselines.floors import Nothing
 from dextron_bench.experts.policies import Case, Expert
+from dextron_bench.splits.rows import Rows
 from dextron_bench.storage import folder_config, tensors
 from dextron_bench.success.dataset import BadDataset
 from dextron_bench.success.generation import (
@@ -19,12 +20,12 @@ from dextron_bench.success.generation import (
     DatasetConfig,
     Tally,
     block_file,
-    draw_cases,
+    draw_rows,
     generate,
 )
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
-TRAIN = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
+TRAIN = Rows(cases=tuple(Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS))
 SMALL = DatasetConfig("synthetic", block=5, policies=("nothing",))
 
 
@@ -45,10 +46,10 @@ def test_half_of_the_blocks_have_experts_and_half_have_policies():
 
 
 def test_uniform_blocks_have_only_reaches_of_train_but_new_settings_and_experts():
-    cases = draw_cases(SOURCE, TRAIN[:1], DatasetConfig(block=40), number=1)
-    assert {case.setting.reach for case in cases} == {TRAIN[0].setting.reach}
-    assert len({case.setting.offset_x for case in cases}) == 40
-    gains, criticals = zip(*((case.expert.gain, case.expert.critical) for case in cases), strict=True)
+    rows = draw_rows(SOURCE, TRAIN.first(1), DatasetConfig(block=40), number=1)
+    assert {case.setting.reach for case in rows.cases} == {TRAIN.case(0).setting.reach}
+    assert len({case.setting.offset_x for case in rows.cases}) == 40
+    gains, criticals = zip(*((case.expert.gain, case.expert.critical) for case in rows.cases), strict=True)
     assert min(gains) >= 1.0
     assert max(gains) <= 1.5
     assert min(criticals) >= 0.01
