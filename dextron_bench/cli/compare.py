@@ -37,15 +37,9 @@ class Compare:
     a result.json, the folder of a run, or the folder of a method's runs. With three methods or more, the table has
     all pairs, and its p values are corrected for their number. docs/statistics.md explains the numbers.
 
-    With --sequential, A and B need not have been evaluated. A method without a result plays the settings in a frozen
-    random order and stops when the difference is decided. It is named as for `eval`: a method, module:Class,
-    file.py:Class, a label with shipped weights, or a file of weights.
-
     Example: dextron-bench compare rlil-0.1-quick rlil-0.1 --reaches real --into difference.png
 
     Example: dextron-bench compare reflex omega bc rlil-0.1 --reaches real
-
-    Example: dextron-bench compare reflex my_agent.py:MyAgent --sequential
 
     Example: dextron-bench compare old/ours/synthetic runs/ours/synthetic --fail-if-worse
     """
@@ -59,27 +53,17 @@ class Compare:
     split: str = "test"
     """The split that all played."""
     reaches: SourceName | None = None
-    """The source of reaches; needed only if the methods have results on several. With --sequential: synthetic."""
+    """The source of reaches; needed only if the methods have results on several."""
     runs: Path = Path("runs")
     """Folder of all runs."""
     into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
     """Also draw the differences into this file."""
     fail_if_worse: bool = False
     """Exit with code 1 if B is worse beyond noise: if the whole interval of the difference B - A is below 0."""
-    sequential: bool = False
-    """Play the settings in a frozen random order, and stop when the difference is decided."""
-    seed: tuple[int, ...] = ()
-    """With --sequential: the seeds of the agents that play; by default all with shipped weights, else 0."""
-    threads: int = 0
-    """With --sequential: threads of the simulation; 0 means one per processor."""
-    quiet: bool = False
-    """With --sequential: show no progress."""
     json: bool = False
     """Print everything as JSON, with all settings whose outcome differs."""
 
     def __call__(self) -> int:
-        if self.sequential:
-            return self._compare_in_order()
         from dextron_bench.runs import result_files
         from dextron_bench.scores import comparison
 
@@ -99,16 +83,6 @@ class Compare:
             differences.differences(result, self.into)
         print_json(as_dict(result)) if self.json else _print(result)
         return DIFFERS if self.fail_if_worse and result.score.is_worse else DONE
-
-    def _compare_in_order(self) -> int:
-        """Compares two methods row by row, until the difference is decided."""
-        from dextron_bench.cli import compare_sequential
-        from dextron_bench.splits.loading import load_split
-
-        if self.others or self.into is not None:
-            raise OnlyForTwo("--sequential compares two methods, and draws no picture")
-        split = load_split(self.reaches or "synthetic", self.split)
-        return compare_sequential.compare(self, split)
 
 
 def as_dict(comparison: Comparison) -> dict[str, Any]:

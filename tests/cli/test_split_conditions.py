@@ -70,7 +70,6 @@ def test_the_conditions_of_a_split_change_its_episodes(
 @pytest.mark.parametrize(
     "words",
     [
-        ("compare", "exp", "nothing", "--sequential", "--quiet"),
         ("data", "export", "--into", "sets", "--quiet"),
         ("windows", "exp", "--quiet"),
         ("success", "eval"),

@@ -36,7 +36,7 @@ def test_a_box_becomes_one_line(box: str):
         ("run --method reflex --naer 1", "unknown flag --naer; did you mean --near?; see `dextron-bench run --help`"),
         ("run --method stopping --settngs=3", "unknown flag --settngs; did you mean --settings?; see"),
         ("run --method-settings 3", "unknown flag --method-settings; did you mean --method?; see"),
-        ("compare reflex --sequental bc", "unknown flag --sequental; did you mean --sequential?; see"),
+        ("compare reflex --fail-if-wors bc", "unknown flag --fail-if-wors; did you mean --fail-if-worse?; see"),
         ("run --method stopping --setting-s 3", "unknown flag --setting-s; did you mean --settings?; see"),
         ("view --lve", "unknown flag --lve; did you mean --live?; see"),
         ("run --seed x", "--seed: "),
