@@ -28,6 +28,7 @@ from dextron_bench.cli.commands import COMMANDS
 from dextron_bench.cli.exit_codes import BUG
 from dextron_bench.methods.isolation import sandbox
 from dextron_bench.recording import viewer
+from dextron_bench.runs import mlflow_export
 
 SECONDS = 0.5  # After which a command has accepted its words, and is ended.
 VALUES = (
@@ -91,6 +92,7 @@ def folder(tiny_world: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
     monkeypatch.setattr(viewer, "viewer_process", refuse)
     monkeypatch.setattr(request, "urlopen", refuse)
+    monkeypatch.setattr(mlflow_export, "_write_database", _accept)  # An import of MLflow that is broken off stays so.
     monkeypatch.setenv("DEXTRON_CACHE", str(tiny_world / "cache"))
     for name, content in {
         **{"file": b"text", "empty.json": b"{}", "list.json": b"[1]", "cut.rrd": b"RRF2\0\0", "bytes": b"\xff\xfe\0"},
