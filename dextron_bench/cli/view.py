@@ -161,8 +161,6 @@ class View(EpisodeFlags):
 
         if len(self.method) != 1:
             raise BadFilter("--live takes the folder of a training, or one --method, such as rlil or exp")
-        if not 0.0 <= self.speed < float("inf"):
-            raise BadFilter(f"--speed must be a multiple of real time, or 0 for no delay, not {self.speed:g}")
 
     def _select(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
         """The recordings of selected episodes; prints a table of them unless --print is set."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dextron_bench.runs.exported_runs import RUNNING, ExportedRun
-from dextron_bench.storage import folders
+from dextron_bench.storage import folders, home
 from dextron_bench.storage.folders import visible
 
 EXPERIMENT = "dextron-bench"
@@ -46,7 +46,7 @@ def write(runs: Iterable[ExportedRun], folder: Path) -> None:
         raise NotEmpty(f"{folder} is not empty; choose another folder with --into")
     if any(find_spec(name) is None for name in NEEDED):
         raise NoMlflow
-    with folders.replacing(folder) as part:
+    with folders.replacing(folder) as part, home.lent():
         _write_database(runs, part / DATABASE, (folder.resolve() / "artifacts").as_uri())
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 
 class NoHome(LookupError):
@@ -15,6 +19,22 @@ def folder(instead: str) -> Path:
         return Path.home()
     except RuntimeError:
         raise NoHome(f"this user has no home folder: {instead}") from None
+
+
+@contextmanager
+def lent() -> Iterator[None]:
+    """For a library that asks for a home folder: an empty one that ends with the block, if the user has none."""
+    try:
+        Path.home()
+    except RuntimeError:
+        with TemporaryDirectory(prefix="dextron-home-") as empty:
+            os.environ["HOME"] = empty
+            try:
+                yield
+            finally:
+                del os.environ["HOME"]
+    else:
+        yield
 
 
 def expanded(path: Path) -> Path:

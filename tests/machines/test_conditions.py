@@ -14,10 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers import conditions, tiny_training
+from tests.helpers import conditions, many_processors, tiny_training
 from tests.helpers.tiny_benchmark import COMMAND
 
 pytestmark = pytest.mark.slow
+ALIKE = "it resembles another condition, and is tried with --thorough"
 
 TOY = tiny_training.TOY
 RECORDING = "runs/reflex/synthetic/seed0/recordings/val-0000.rrd"
@@ -52,44 +53,58 @@ def all_work(folder: Path, environment: dict[str, str], redirection: str = "") -
 
 @pytest.mark.parametrize(
     "names",
-    ["no_flock,no_folder_fsync", "no_fcntl,no_fsync,no_links", "no_exclusive,no_modes,no_mmap", "no_name,process_one"],
+    ["no_flock,no_folder_fsync,no_name,process_one", "no_fcntl,no_fsync,no_links,no_exclusive,no_modes,no_mmap"],
 )
 def test_file_systems_and_users(names: str, tmp_path: Path):
     all_work(tmp_path, conditions.environment(*names.split(",")) | {"TMPDIR": str(tmp_path)})
 
 
-@pytest.mark.parametrize("redirection", ["<&-", ">&-", "2>&-"])
+@pytest.mark.parametrize("redirection", ["<&- 2>&-", ">&-"])
 def test_streams_that_are_closed(redirection: str, tmp_path: Path):
     all_work(tmp_path, dict(os.environ), redirection)
 
 
-def test_a_locale_without_utf8(tmp_path: Path):
-    latin = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    all_work(tmp_path, latin)
+@pytest.mark.parametrize("count", [64, 128])
+def test_many_processors(count: int, tmp_path: Path, thorough: bool):
+    if count < 128 and not thorough:
+        pytest.skip(ALIKE)
+    all_work(tmp_path, many_processors.environment(tmp_path, count))
+
+
+@pytest.mark.parametrize("charset", ["ASCII", "ISO-8859-1"])
+def test_a_locale_without_utf8(charset: str, tmp_path: Path, thorough: bool):
+    if charset == "ASCII" and not thorough:
+        pytest.skip(ALIKE)
+    variables = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    if charset != "ASCII":
+        made = subprocess.run(["localedef", "-i", "en_US", "-f", charset, tmp_path / "en_US"], capture_output=True)
+        if made.returncode > 1:  # 1 is a warning.
+            pytest.skip("a locale of Latin-1 is made from the sources of locales (Debian: locales)")
+        variables |= {"LC_ALL": "en_US", "LOCPATH": str(tmp_path)}
+    environment = {**os.environ, **variables}
+    encoding = [sys.executable, "-c", "import locale; print(locale.getencoding())"]
+    assert subprocess.check_output(encoding, env=environment, text=True).strip() in (charset, "ANSI_X3.4-1968", "646")
+    all_work(tmp_path, environment)
     for words in ("--help", "run --help"):
-        done = run(words, tmp_path, latin)
+        done = run(words, tmp_path, environment)
         assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_runs_behind_links(tmp_path: Path):
+@pytest.mark.skipif(not shutil.which("script"), reason="`script` gives a command a terminal (Debian: bsdutils)")
+def test_runs_behind_a_link_and_tables_in_a_terminal_of_80_columns(tmp_path: Path):
     (tmp_path / "disk").mkdir()
     here = tmp_path / "here"
     here.mkdir()
     (here / "runs").symlink_to("../disk")
-    all_work(here, dict(os.environ))
-    assert (tmp_path / "disk/reflex/synthetic/seed0/result.json").exists()
-
-
-@pytest.mark.skipif(not shutil.which("script"), reason="`script` gives a command a terminal (Debian: bsdutils)")
-def test_tables_fit_a_terminal_of_80_columns(tmp_path: Path):
     environment = {**os.environ, "TERM": "xterm"}
     for words in COMMANDS:
         command = f'stty cols 80; "{sys.executable}" "{COMMAND}" data {words}'
         done = subprocess.run(
-            ["script", "-qec", command, "/dev/null"], cwd=tmp_path, env=environment, capture_output=True, text=True
+            ["script", "-qec", command, "/dev/null"], cwd=here, env=environment, capture_output=True, text=True
         )
         assert done.returncode == 0, done.stdout
         lines = re.sub(r"\x1b\[[\d;]*m", "", done.stdout).splitlines()
         rows = [line for line in lines if line.startswith(("│", "┃"))]
         assert all(len(line.rstrip()) <= 80 for line in rows)
         assert rows or words not in ("list", "recordings list", COMMANDS[2])
+    assert (tmp_path / "disk/reflex/synthetic/seed0/result.json").exists()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import subprocess
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -43,6 +45,16 @@ flags\t\t: none"""
 ARM = "processor : 0\nFeatures : fp asimd evtstrm aes crc32 asimdhp sve sve2 sme smei16i64\nCPU part : 0xd40"
 
 
+def describe_processor(monkeypatch: pytest.MonkeyPatch, describe: Callable[[], str]) -> None:
+    """Replaces the content of /proc/cpuinfo, and of no other file."""
+    read_text = Path.read_text
+
+    def read(path: Path, *arguments: Any, **named: Any) -> str:
+        return describe() if str(path) == "/proc/cpuinfo" else read_text(path, *arguments, **named)
+
+    monkeypatch.setattr(Path, "read_text", read)
+
+
 @pytest.mark.parametrize(
     ("text", "cpu", "extensions"),
     [
@@ -59,17 +71,17 @@ ARM = "processor : 0\nFeatures : fp asimd evtstrm aes crc32 asimdhp sve sve2 sme
 def test_the_machine_has_its_vector_extensions(
     text: str, cpu: str | None, extensions: list[str] | None, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(Path, "read_text", lambda *_, **__: text)
+    describe_processor(monkeypatch, lambda: text)
     machine = provenance.collect("")["machine"]
     assert machine["vector_extensions"] == extensions
     assert machine["cpu"] == (cpu or provenance.platform.processor() or provenance.platform.machine())
 
 
 def test_a_system_that_does_not_describe_its_processor_has_no_vector_extensions(monkeypatch: pytest.MonkeyPatch):
-    def missing(*_: object, **__: object) -> str:
+    def missing() -> str:
         raise FileNotFoundError("/proc/cpuinfo")
 
-    monkeypatch.setattr(Path, "read_text", missing)
+    describe_processor(monkeypatch, missing)
     assert provenance.vector_extensions() is None
     assert provenance.collect("")["machine"]["cpu"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -100,7 +101,7 @@ def test_an_agent_that_uses_up_its_time_is_stopped(agent_spec: Callable[[str], s
 def test_a_program_that_does_not_follow_the_protocol_is_reported(tmp_path: Path, line: str, why: str):
     (tmp_path / "agent.py").write_text(f"input()\n{line}\ninput()\n")
     with pytest.raises(AgentError, match="the agent") as caught:
-        play(f"exec:{sys.executable} {tmp_path}/agent.py")
+        play(f"exec:{shlex.quote(sys.executable)} {tmp_path}/agent.py")
     assert why in str(caught.value)
 
 
@@ -114,7 +115,7 @@ for line in sys.stdin:
 
 def test_a_program_that_follows_the_protocol_plays(tmp_path: Path):
     (tmp_path / "agent.py").write_text(PROGRAM)
-    for episode in play(f"exec:{sys.executable} {tmp_path}/agent.py"):
+    for episode in play(f"exec:{shlex.quote(sys.executable)} {tmp_path}/agent.py"):
         assert episode.failure == ""
         assert (episode.actions == 0.5).all()
 

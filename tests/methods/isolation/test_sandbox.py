@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -38,7 +39,7 @@ SENT = "socket.send_fds(left, [b'x'], [file.fileno()]); os.unlink(str(k))"
 @pytest.mark.parametrize(("before", "after"), [(DEEP, "pass"), ("", MAPPED), ("", SENT)])
 def test_files_that_cannot_be_seen_from_outside_are_limited_too(before: str, after: str, tmp_path: Path):
     (tmp_path / "agent.py").write_text(PROGRAM.format(before=before, after=after))
-    launch = prepare_launch(f"exec:{sys.executable} {tmp_path}/agent.py")
+    launch = prepare_launch(f"exec:{shlex.quote(sys.executable)} {tmp_path}/agent.py")
     with IsolatedAgent(launch, limits=Limits(answer=200.0, start=200.0, disk=16 * 2**20)) as agent:
         with pytest.raises(AgentCrashed, match="No space left on device"):
             agent.act(np.zeros((1, 48)))
