@@ -15,7 +15,7 @@ from baselines.networks import Stack
 from baselines.normalise import CLIP, EPSILON
 from baselines.policy import MeanAgent
 from baselines.schedule import SCHEDULES, Scheduled
-from dextron_bench import Track, Trainer
+from dextron_bench import Trainer, TrainingSetup
 from dextron_bench.methods.learners import Arrays
 
 BATCH = 512  # Table II.
@@ -40,10 +40,10 @@ class Bc(Scheduled):
         """Expert transitions in each batch: all of them."""
         return BATCH
 
-    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+    def trainer(self, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
         """A trainer with one network per seed, all trained together."""
         schedule = SCHEDULES[self.preset]
-        return Cloning(demonstrations.load(track, schedule.episodes), seeds, track.device)
+        return Cloning(demonstrations.load(setup, schedule.episodes), seeds, setup.device)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
         """The agent that plays the network's output."""

@@ -18,7 +18,7 @@ from baselines.random_streams import ACTING, EPISODES, HOLDING, NETWORKS, WARM_S
 from baselines.replay import CAPACITY, Replay, Transitions
 from baselines.sac import BATCH, Batch
 from baselines.schedule import Exploration, Schedule
-from dextron_bench import Case, Track
+from dextron_bench import Case, TrainingSetup
 from dextron_bench.methods.learners import Arrays
 from dextron_bench.world.engine import Engine
 
@@ -89,7 +89,7 @@ class Cycle:
 
     def __init__(
         self,
-        track: Track,
+        setup: TrainingSetup,
         seeds: Sequence[int],
         schedule: Schedule,
         algorithm: Callable[[Sequence[np.random.Generator], str], Algorithm],
@@ -102,15 +102,15 @@ class Cycle:
         `algorithm` takes a generator for each agent's networks, and the device.
         """
         self.epoch = 0
-        self._track, self._seeds, self._schedule, self._exploration = track, list(seeds), schedule, exploration
+        self._setup, self._seeds, self._schedule, self._exploration = setup, list(seeds), schedule, exploration
         self._demonstrations, self._demonstrated, self._frames = demonstrations, demonstrated, 0
         agents = len(self._seeds)
-        self._algorithm = algorithm([generator(seed, NETWORKS) for seed in seeds], track.device)
+        self._algorithm = algorithm([generator(seed, NETWORKS) for seed in seeds], setup.device)
         self._networks = self._algorithm.networks
         self._states, self._rewards = Moments(agents, STATE), Moments(agents, 1)
         self._replay = Replay(agents, CAPACITY + CAPACITY // 16)
         self._ids = np.arange(agents)
-        self._engine = Engine(agents, track.threads)
+        self._engine = Engine(agents, setup.threads)
         self._episodes = np.zeros(agents, int)
         self._score = np.zeros(agents)
         self._noise, self._length, self._holds = np.zeros((agents, 1)), np.zeros(agents, int), np.zeros(agents, bool)
@@ -173,7 +173,7 @@ class Cycle:
             {name.removeprefix("sac."): array for name, array in state.items() if name.startswith("sac.")}
         )
         paths = [
-            self._track.source.path(self._case(k, int(self._episodes[k]) - 1).setting) for k in range(len(self._ids))
+            self._setup.source.path(self._case(k, int(self._episodes[k]) - 1).setting) for k in range(len(self._ids))
         ]
         self._engine.begin(self._ids, paths)
         self._engine.load(
@@ -236,12 +236,12 @@ class Cycle:
             self._holds[k] = draw < self._exploration.share
         self._length[agents] = 0
         self._episodes[agents] += 1
-        return self._engine.begin(agents, [self._track.source.path(case.setting) for case in cases])
+        return self._engine.begin(agents, [self._setup.source.path(case.setting) for case in cases])
 
     def _case(self, agent: int, episode: int) -> Case:
         """The case of an agent's episode, by its number."""
         rng = generator(self._seeds[agent], EPISODES, episode)
-        return self._track.cases[int(rng.integers(len(self._track.cases)))]
+        return self._setup.cases[int(rng.integers(len(self._setup.cases)))]
 
     def _act(self, noise: np.ndarray) -> np.ndarray:
         """Sampled actions (S, 1) in the current states."""
@@ -278,4 +278,4 @@ class Cycle:
         return metrics
 
     def _tensor(self, array: np.ndarray) -> Tensor:
-        return torch.tensor(array, dtype=torch.float32, device=self._track.device)
+        return torch.tensor(array, dtype=torch.float32, device=self._setup.device)

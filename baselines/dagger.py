@@ -13,7 +13,7 @@ from torch import Tensor
 from baselines import demonstrations, policy
 from baselines.bc import BATCH, Bc, Cloning
 from baselines.schedule import SCHEDULES
-from dextron_bench import Case, ExpertAgent, Track, Trainer
+from dextron_bench import Case, ExpertAgent, Trainer, TrainingSetup
 from dextron_bench.methods.learners import Arrays
 from dextron_bench.world.engine import Engine
 
@@ -29,19 +29,19 @@ class Dagger(Bc):
 
     name: ClassVar[str] = "dagger"
 
-    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+    def trainer(self, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
         """A trainer with one network per seed, all trained together."""
         schedule = SCHEDULES[self.preset]
-        return Aggregation(track, demonstrations.load(track, schedule.episodes), seeds)
+        return Aggregation(setup, demonstrations.load(setup, schedule.episodes), seeds)
 
 
 class Aggregation(Cloning):
     """The Trainer of DAgger: clones demonstrations and, in equal parts, the experts' answers to the agents' states."""
 
-    def __init__(self, track: Track, demos: demonstrations.Demonstrations, seeds: Sequence[int]) -> None:
-        super().__init__(demos, seeds, track.device)
-        self._track, self._agents = track, len(self._seeds)
-        self._engine = Engine(self._agents * EPISODES, track.threads)
+    def __init__(self, setup: TrainingSetup, demos: demonstrations.Demonstrations, seeds: Sequence[int]) -> None:
+        super().__init__(demos, seeds, setup.device)
+        self._setup, self._agents = setup, len(self._seeds)
+        self._engine = Engine(self._agents * EPISODES, setup.threads)
         self._met: list[Arrays] = []  # By epoch: states (R, 48), actions (R,), and the agent (R,) that met them.
         self._pools = [_Pool() for _ in self._seeds]
 
@@ -71,7 +71,7 @@ class Aggregation(Cloning):
         experts = ExpertAgent()
         experts.assign(slots, [case.expert for case in cases])
         experts.reset(slots)
-        states = self._engine.begin(slots, [self._track.source.path(case.setting) for case in cases])
+        states = self._engine.begin(slots, [self._setup.source.path(case.setting) for case in cases])
         live, returns, met = slots, np.zeros(len(slots)), []
         while live.size:
             answers = experts.act(states)[:, 0]
@@ -92,7 +92,7 @@ class Aggregation(Cloning):
 
     def _case(self, seed: int, number: int) -> Case:
         rng = np.random.default_rng([seed, PLAYED, self.epoch, number])
-        return self._track.cases[int(rng.integers(len(self._track.cases)))]
+        return self._setup.cases[int(rng.integers(len(self._setup.cases)))]
 
     def _add(self, played: Arrays) -> None:
         for agent, pool in enumerate(self._pools):

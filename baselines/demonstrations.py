@@ -11,7 +11,7 @@ import numpy as np
 
 from baselines.random_streams import DEMONSTRATIONS, generator
 from baselines.replay import CAPACITY, Transitions
-from dextron_bench import Case, Episode, ExpertAgent, Track, rollout
+from dextron_bench import Case, Episode, ExpertAgent, TrainingSetup, rollout
 from dextron_bench.storage import atomic, hashing, tensors
 from dextron_bench.world import model
 
@@ -91,15 +91,15 @@ class Everything:
         return self.episodes.at(self.rows[(uniform * len(self.rows)).astype(int)])
 
 
-def load(track: Track, episodes: int | None = None) -> Demonstrations:
-    """The experts' episodes on the first `episodes` cases of a track (default: all), played or from the cache.
+def load(setup: TrainingSetup, episodes: int | None = None) -> Demonstrations:
+    """The experts' episodes on the first `episodes` cases of a training (default: all), played or from the cache.
 
     Raises DamagedFile.
     """
-    cases = track.cases[:episodes]
-    file = track.cache / f"demonstrations-{_digest(cases)[:16]}.safetensors"
+    cases = setup.cases[:episodes]
+    file = setup.cache / f"demonstrations-{_digest(cases)[:16]}.safetensors"
     if not file.exists():
-        tensors.write(file, play(track, cases), {})
+        tensors.write(file, play(setup, cases), {})
     return _stored(file, len(cases))
 
 
@@ -116,12 +116,12 @@ def _stored(file: Path, episodes: int) -> Demonstrations:
     return Demonstrations(**arrays)
 
 
-def play(track: Track, cases: Sequence[Case]) -> dict[str, np.ndarray]:
+def play(setup: TrainingSetup, cases: Sequence[Case]) -> dict[str, np.ndarray]:
     """The arrays of `Demonstrations`, from rollouts of each case's expert."""
     played: dict[int, Episode] = {}
-    for number, episode in rollout(ExpertAgent(), track.source, cases, threads=track.threads):
+    for number, episode in rollout(ExpertAgent(), setup.source, cases, threads=setup.threads):
         played[number] = episode
-        track.report(len(played), len(cases), "expert episodes played")
+        setup.report(len(played), len(cases), "expert episodes played")
     episodes = [played[k] for k in range(len(cases))]
     lengths = [len(episode.states) for episode in episodes]
     return {

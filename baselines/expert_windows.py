@@ -6,18 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dextron_bench import Case, Track, rollout
+from dextron_bench import Case, TrainingSetup, rollout
 from dextron_bench.experts.openings import EVERY, FAILS, NEAR, NO_DECISION, SUCCEEDS, Episode
 from dextron_bench.world import task
 
 
-def play(track: Track, cases: Sequence[Case]) -> list[Episode]:
+def play(setup: TrainingSetup, cases: Sequence[Case]) -> list[Episode]:
     """The openings of the cases' settings, with outcomes from their windows; those without any success are left out."""
     episodes: dict[int, Episode] = {}
-    for number, played in rollout(_Opening(), track.source, cases, threads=track.threads):
+    for number, played in rollout(_Opening(), setup.source, cases, threads=setup.threads):
         states = played.states[:-1]
         episodes[number] = states, outcomes(cases[number], task.distance(states))
-        track.report(len(episodes), len(cases), "settings opened")
+        setup.report(len(episodes), len(cases), "settings opened")
     return [one for _, one in sorted(episodes.items()) if (one[1] == SUCCEEDS).any()]
 
 

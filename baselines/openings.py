@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dextron_bench import Setting, Track
+from dextron_bench import Setting, TrainingSetup
 from dextron_bench.experts.openings import EVERY, NEAR, NO_DECISION, SUCCEEDS, TOGETHER, Episode, Openings, joined, play
 from dextron_bench.reaches.setting import OFFSET
 from dextron_bench.storage import atomic, hashing, tensors
@@ -23,21 +23,21 @@ DRAWN_TOGETHER = 5  # Nearby settings in a batch.
 NOISE_SHIFT = 0.05, 0.25  # Added to its duration noise. The rows of `hard` keep the noise, so none is near-equal.
 
 
-def settings_of(track: Track) -> list[Setting]:
-    """The settings of a track's cases, each once, in their order."""
-    return list(dict.fromkeys(case.setting for case in track.cases))
+def settings_of(setup: TrainingSetup) -> list[Setting]:
+    """The settings of a training's cases, each once, in their order."""
+    return list(dict.fromkeys(case.setting for case in setup.cases))
 
 
-def load(track: Track, settings: Sequence[Setting]) -> list[Episode]:
-    """The opening of each setting, played or from the track's cache; raises DamagedFile.
+def load(setup: TrainingSetup, settings: Sequence[Setting]) -> list[Episode]:
+    """The opening of each setting, played or from its cache; raises DamagedFile.
 
     The cache has a file for each reach. So a killed call continues, and other choices of reaches share the files.
     """
     by_reach: dict[str, list[Setting]] = {}
     for setting in settings:
         by_reach.setdefault(setting.reach, []).append(setting)
-    groups = [(track.cache / f"openings-{_digest(group)[:16]}.safetensors", group) for group in by_reach.values()]
-    _play_missing(track, [(file, group) for file, group in groups if not file.exists()])
+    groups = [(setup.cache / f"openings-{_digest(group)[:16]}.safetensors", group) for group in by_reach.values()]
+    _play_missing(setup, [(file, group) for file, group in groups if not file.exists()])
     episodes = {setting: one for file, group in groups for setting, one in zip(group, _read(file), strict=True)}
     return [episodes[setting] for setting in settings]
 
@@ -49,13 +49,13 @@ def rule_succeeds(episode: Episode, edge: float) -> bool:
     return bool(within.size) and within[0] == SUCCEEDS
 
 
-def load_nearby(track: Track, settings: Sequence[Setting], copies: int) -> list[list[Episode]]:
+def load_nearby(setup: TrainingSetup, settings: Sequence[Setting], copies: int) -> list[list[Episode]]:
     """The openings of `copies` settings near each setting; raises DamagedFile.
 
     They are drawn and kept in batches, so that trainings with more copies share the files of those with fewer.
     """
     batches = range(-(-copies // DRAWN_TOGETHER))
-    played = [load(track, [near for one in settings for near in nearby(one, batch)]) for batch in batches]
+    played = [load(setup, [near for one in settings for near in nearby(one, batch)]) for batch in batches]
     return [
         [one for batch in played for one in batch[first : first + DRAWN_TOGETHER]][:copies]
         for first in range(0, len(settings) * DRAWN_TOGETHER, DRAWN_TOGETHER)
@@ -72,17 +72,17 @@ def nearby(setting: Setting, batch: int) -> list[Setting]:
     return [Setting(setting.reach, *values) for values in np.concatenate([offsets, noise], axis=1).tolist()]
 
 
-def _play_missing(track: Track, groups: Sequence[tuple[Path, list[Setting]]]) -> None:
+def _play_missing(setup: TrainingSetup, groups: Sequence[tuple[Path, list[Setting]]]) -> None:
     """Plays groups of settings, at least TOGETHER settings at once, and writes the file of each group."""
     total = sum(len(settings) for _, settings in groups)
     played = 0
     waiting: list[tuple[Path, list[Setting]]] = []
     for number, group in enumerate(groups, 1):
-        track.report(played, total, "settings opened, with forks")
+        setup.report(played, total, "settings opened, with forks")
         waiting.append(group)
         if sum(len(settings) for _, settings in waiting) < TOGETHER and number < len(groups):
             continue
-        episodes = iter(play(track.source, [one for _, settings in waiting for one in settings], track.threads))
+        episodes = iter(play(setup.source, [one for _, settings in waiting for one in settings], setup.threads))
         for file, settings in waiting:
             arrays = asdict(joined([next(episodes) for _ in settings]))
             tensors.write(file, arrays, {})

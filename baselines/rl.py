@@ -16,7 +16,7 @@ from baselines.policy import MeanAgent
 from baselines.random_streams import BATCHES, NOISE, Draws
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import SCHEDULES, Exploration, Schedule, Scheduled
-from dextron_bench import Track, Trainer
+from dextron_bench import Trainer, TrainingSetup
 
 HELD_SHARE = 0.25  # Share of the episodes after the warm start that hold their noise, if `hold` is above 1.
 
@@ -53,10 +53,10 @@ class Rl(Scheduled):
         """The part of the label that names the paper's method."""
         return self.name
 
-    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+    def trainer(self, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
         """A trainer with one SAC agent per seed, all trained together."""
         exploration = Exploration(self.hold, HELD_SHARE if self.hold > 1 else 0.0)
-        return trainer(track, seeds, SCHEDULES[self.preset], self.demonstrated, exploration, self.critics)
+        return trainer(setup, seeds, SCHEDULES[self.preset], self.demonstrated, exploration, self.critics)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
         """The agent that plays the policy's mean."""
@@ -84,7 +84,7 @@ class OneUpdate:
 
 
 def trainer(
-    track: Track,
+    setup: TrainingSetup,
     seeds: Sequence[int],
     schedule: Schedule,
     demonstrated: int = 0,
@@ -94,7 +94,7 @@ def trainer(
     """The trainer of RL, or of RLIL if some transitions of a batch are `demonstrated`."""
     experts = None
     if demonstrated:
-        episodes = demonstrations.load(track, schedule.episodes)
+        episodes = demonstrations.load(setup, schedule.episodes)
         experts = demonstrations.Streamed.draw(episodes, seeds, schedule.epochs * cycle.FRAMES)
     algorithm = partial(OneUpdate, critics=critics)
-    return cycle.Cycle(track, seeds, schedule, algorithm, experts, demonstrated, exploration)
+    return cycle.Cycle(setup, seeds, schedule, algorithm, experts, demonstrated, exploration)

@@ -24,7 +24,7 @@ from baselines.policy import STATE, MeanAgent
 from baselines.random_streams import BATCHES, NOISE, PAIRS, Draws
 from baselines.sac import DISCOUNT, LEARNING_RATE, Batch, action_value_target
 from baselines.schedule import SCHEDULES, Scheduled
-from dextron_bench import Track, Trainer
+from dextron_bench import Trainer, TrainingSetup
 
 WARM_START = 1000  # Frames with random actions, before the first update.
 POLYAK = 0.005
@@ -64,11 +64,11 @@ class Rlpd(Scheduled):
         """Expert transitions in each batch: half of them."""
         return self.batch // 2
 
-    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+    def trainer(self, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
         """A trainer with one agent per seed, all trained together."""
         schedule = replace(SCHEDULES[self.preset], warm_start=WARM_START)
-        experts = Everything.of(demonstrations.load(track, schedule.episodes))
-        return Cycle(track, seeds, schedule, partial(SeveralUpdates, method=self), experts, self.demonstrated)
+        experts = Everything.of(demonstrations.load(setup, schedule.episodes))
+        return Cycle(setup, seeds, schedule, partial(SeveralUpdates, method=self), experts, self.demonstrated)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> MeanAgent:
         """The agent that plays the policy's mean."""

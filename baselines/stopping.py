@@ -12,7 +12,7 @@ import numpy as np
 from baselines import expert_windows, generated_reaches, openings, pose_features, stopping_trainer
 from baselines.normalise import CLIP
 from baselines.stopping_trainer import EDGE
-from dextron_bench import Perceptron, Setting, Track, Trainer
+from dextron_bench import Perceptron, Setting, Trainer, TrainingSetup
 from dextron_bench.experts.openings import EVERY, NEAR, SUCCEEDS, Episode
 from dextron_bench.methods.exact import rounded
 from dextron_bench.world import task
@@ -80,39 +80,41 @@ class Stopping:
         """The training itself, which takes minutes."""
         return self
 
-    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+    def trainer(self, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
         """A trainer with several networks per seed, all trained together."""
-        episodes = self._by_forks(track) if self.labels == "forks" else self._by_windows(track)
-        return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(episodes, track.device), seeds, track.device)
+        episodes = self._by_forks(setup) if self.labels == "forks" else self._by_windows(setup)
+        return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(episodes, setup.device), seeds, setup.device)
 
-    def _by_windows(self, track: Track) -> list[Episode]:
+    def _by_windows(self, setup: TrainingSetup) -> list[Episode]:
         """The openings of settings, with labels from the windows of their experts."""
-        cases = list({case.setting: case for case in track.cases}.values())
-        return expert_windows.play(track, cases[: self.settings or len(cases)])
+        cases = list({case.setting: case for case in setup.cases}.values())
+        return expert_windows.play(setup, cases[: self.settings or len(cases)])
 
-    def _by_forks(self, track: Track) -> list[Episode]:
+    def _by_forks(self, setup: TrainingSetup) -> list[Episode]:
         """The openings of settings, of settings near them and of generated ones, with labels that were tried."""
-        settings = openings.settings_of(track)
-        played = openings.load(track, settings)  # All of them, so that all numbers of settings share the files.
-        near = self._nearby(track, settings, played)
+        settings = openings.settings_of(setup)
+        played = openings.load(setup, settings)  # All of them, so that all numbers of settings share the files.
+        near = self._nearby(setup, settings, played)
         count = self.settings or len(settings)
-        return [*played[:count], *chain.from_iterable(near[:count]), *self._generated(track, settings[:count])]
+        return [*played[:count], *chain.from_iterable(near[:count]), *self._generated(setup, settings[:count])]
 
-    def _nearby(self, track: Track, settings: Sequence[Setting], played: Sequence[Episode]) -> list[list[Episode]]:
+    def _nearby(
+        self, setup: TrainingSetup, settings: Sequence[Setting], played: Sequence[Episode]
+    ) -> list[list[Episode]]:
         """For each setting (with its opening `played`) that the rule fails, openings near it that closing can solve."""
         failed = [row for row, episode in enumerate(played) if not openings.rule_succeeds(episode, EDGE)]
-        near = openings.load_nearby(track, [settings[row] for row in failed], self.nearby)
+        near = openings.load_nearby(setup, [settings[row] for row in failed], self.nearby)
         solvable: list[list[Episode]] = [[] for _ in settings]
         for row, episodes in zip(failed, near, strict=True):
             solvable[row] = [episode for episode in episodes if (episode[1] == SUCCEEDS).any()]
         return solvable
 
-    def _generated(self, track: Track, settings: Sequence[Setting]) -> list[Episode]:
+    def _generated(self, setup: TrainingSetup, settings: Sequence[Setting]) -> list[Episode]:
         """The openings on reaches that are generated from the reaches of settings, if closing can succeed."""
         if not self.generated:
             return []
-        source, new = generated_reaches.generate(track.source, settings, self.generated)
-        played = openings.load(replace(track, source=source), new)
+        source, new = generated_reaches.generate(setup.source, settings, self.generated)
+        played = openings.load(replace(setup, source=source), new)
         return [episode for episode in played if (episode[1] == SUCCEEDS).any()]
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> StoppingAgent:

@@ -5,6 +5,7 @@ registers the environment `dextron_bench/Grasp-v0` with Gymnasium. Beside these 
 `world.suite`, `world.model`, `world.task` and `success.network` are public; all other modules are private.
 """
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from dextron_bench.experts.policies import Case, Expert, ExpertAgent
     from dextron_bench.methods.agents import Agent
     from dextron_bench.methods.exact import Perceptron
-    from dextron_bench.methods.learners import Learner, Track, Trainer
+    from dextron_bench.methods.learners import Learner, Trainer, TrainingSetup
     from dextron_bench.reaches.setting import Setting
     from dextron_bench.reaches.sources import open_source
     from dextron_bench.recording.episode_file import read as read_recording
@@ -39,8 +40,8 @@ __all__ = [
     "Setting",
     "Split",
     "SuccessModel",
-    "Track",
     "Trainer",
+    "TrainingSetup",
     "__version__",
     "diagnose",
     "load_environment",
@@ -62,7 +63,7 @@ _HOMES = {  # The module of each public name, and its name there if that differs
     "Setting": "reaches.setting",
     "Split": "splits.loading",
     "SuccessModel": "success.network",
-    "Track": "methods.learners",
+    "TrainingSetup": "methods.learners",
     "Trainer": "methods.learners",
     "diagnose": "evaluation.diagnosis",
     "load_environment": "world.suite:load",
@@ -72,6 +73,7 @@ _HOMES = {  # The module of each public name, and its name there if that differs
     "replay": "evaluation.replay",
     "rollout": "evaluation.rollout",
 }
+_RENAMED = {"Track": "TrainingSetup"}  # Names of earlier versions.
 
 
 def __getattr__(name: str) -> Any:
@@ -79,6 +81,9 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("dextron-bench")
+    if name in _RENAMED:
+        warnings.warn(f"dextron_bench.{name} is now {_RENAMED[name]}", DeprecationWarning, stacklevel=2)
+        name = _RENAMED[name]
     if name not in _HOMES:
         raise AttributeError(f"module 'dextron_bench' has no public name {name!r}; see dextron_bench.__all__")
     module, _, other = _HOMES[name].partition(":")

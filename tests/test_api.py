@@ -20,7 +20,7 @@ NEEDED = {  # What the first use of a name may load; all other names may load ev
     "Learner": set(),
     "Perceptron": set(),
     "SuccessModel": {"mujoco", "scipy"},
-    "Track": set(),
+    "TrainingSetup": set(),
     "Trainer": set(),
     "__version__": set(),
 }
@@ -49,6 +49,11 @@ def test_the_listed_names_are_the_loaded_ones():
         for alias in node.names
     }
     assert typed | {"__version__"} == set(dextron_bench.__all__) == dextron_bench._HOMES.keys() | {"__version__"}
+
+
+def test_an_earlier_name_answers_with_the_new_one():
+    with pytest.warns(DeprecationWarning, match="Track is now TrainingSetup"):
+        assert dextron_bench.Track is dextron_bench.TrainingSetup  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def test_the_import_of_the_package_loads_nothing_heavy():

@@ -162,6 +162,6 @@ def train_some(
 
 def _expected(training: Training) -> dict[str, Any]:
     """What a training depends on, besides the installation."""
-    learner, track = training.job.learner, replace(training.job, device="cpu").track()
+    learner, setup = training.job.learner, replace(training.job, device="cpu").setup()
     code = provenance.code_hash(*registry.package_files(type(learner)))
-    return {"code of the method": code, **loop.config(learner, track, training.seeds)}
+    return {"code of the method": code, **loop.config(learner, setup, training.seeds)}

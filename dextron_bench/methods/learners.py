@@ -30,7 +30,7 @@ def _report_nothing(done: int, total: int, note: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class TrainingSetup:
     """What a learner trains with.
 
     `source` gives the reaches, and `cases` are the rows of `train`: settings with their experts. `cache` is a folder
@@ -122,7 +122,7 @@ class Learner(Protocol):
         """
         ...
 
-    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+    def trainer(self, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
         """A new trainer for these seeds, with `epoch` 0; equal seeds give equal trainings."""
         ...
 

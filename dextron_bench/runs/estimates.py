@@ -65,7 +65,7 @@ def _training(job: TrainingJob, seeds: tuple[int, ...], folder: Path) -> dict[st
     seconds = timing.seconds_left(folder, left, learner.period)
     if seconds is None and learner.timing_run.epochs <= SHORT:
         rows = min(POINT_ROWS, len(load_split(job.reaches, "val"))) * math.ceil(left / learner.period)
-        seconds = left * loop.seconds_per_epoch(learner, job.track(), seeds)
+        seconds = left * loop.seconds_per_epoch(learner, job.setup(), seeds)
         seconds += rows * len(seeds) * seconds_per_episode(job.reaches, job.threads)
     return {
         "what": "train",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dextron_bench.methods import registry
-from dextron_bench.methods.learners import Learner, Track
+from dextron_bench.methods.learners import Learner, TrainingSetup
 from dextron_bench.reaches import sources
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import Split, load_split
@@ -54,20 +54,20 @@ class TrainingJob:
         for seed in seeds:
             folder_config.check(self.run_folder(seed).path, registry.run_config(self.learner, self.reaches, seed))
         for group in self.groups(seeds):
-            track, val = replace(self.track(), report=report), self._split("val")
+            setup, val = replace(self.setup(), report=report), self._split("val")
             for seed in group:
                 config = registry.run_config(self.learner, self.reaches, seed)
                 folder_config.write_or_check(self.run_folder(seed).path, config)
-            checkpoints = loop.train(self.learner, track, group, self.training_folder(group), val, report, watch)
-            curve = Curve(self.learner, checkpoints, track.source, val, self.threads)
+            checkpoints = loop.train(self.learner, setup, group, self.training_folder(group), val, report, watch)
+            curve = Curve(self.learner, checkpoints, setup.source, val, self.threads)
             for seed in group:
                 self._publish_best(checkpoints, curve, seed)
 
-    def track(self) -> Track:
+    def setup(self) -> TrainingSetup:
         """What the learner trains with; raises NoDevice, UnknownSplit, MissingData."""
         cases = self._split("train").cases
         source = sources.open_source(self.reaches)
-        return Track(source, cases, self.runs / "cache", self.threads, _device(self.device))
+        return TrainingSetup(source, cases, self.runs / "cache", self.threads, _device(self.device))
 
     def run_folder(self, seed: int) -> RunFolder:
         """The folder of a seed's run."""

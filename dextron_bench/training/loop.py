@@ -15,7 +15,7 @@ from typing import Any
 
 from dextron_bench.methods import loading, registry
 from dextron_bench.methods.agents import AgentError, as_agent_error
-from dextron_bench.methods.learners import Learner, Track, Trainer
+from dextron_bench.methods.learners import Learner, Trainer, TrainingSetup
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import folder_config, hashing
 from dextron_bench.storage.folders import visible
@@ -59,7 +59,7 @@ def no_watch(curves: dict[int, list[dict[str, Any]]]) -> None:
 
 def train(
     learner: Learner,
-    track: Track,
+    setup: TrainingSetup,
     seeds: Sequence[int],
     folder: Path,
     val: Split,
@@ -72,12 +72,12 @@ def train(
     FolderMismatch, DamagedFile.
     """
     checkpoints = Checkpoints(folder, seeds)
-    curve = Curve(learner, checkpoints, track.source, val, track.threads)
+    curve = Curve(learner, checkpoints, setup.source, val, setup.threads)
     with checkpoints.locked():
-        folder_config.write_or_check(folder, config(learner, track, seeds))
+        folder_config.write_or_check(folder, config(learner, setup, seeds))
         progress = checkpoints.progress()
         if not progress or not progress.over:
-            _TrainingRun(learner, track, checkpoints, curve, report, watch).finish()
+            _TrainingRun(learner, setup, checkpoints, curve, report, watch).finish()
         checkpoints.finish()
         curve.score_snapshots()
         for seed in seeds:
@@ -86,22 +86,22 @@ def train(
     return checkpoints
 
 
-def config(learner: Learner, track: Track, seeds: Sequence[int]) -> dict[str, Any]:
+def config(learner: Learner, setup: TrainingSetup, seeds: Sequence[int]) -> dict[str, Any]:
     """What a training depends on; a training with another config does not continue it."""
     return {
         "method": learner.name,
         "code": loading.class_origin(type(learner)),
         "settings": registry.settings_of(learner),
         "seeds": list(seeds),
-        "cases": hashing.digest(repr(list(track.cases)).encode()),
+        "cases": hashing.digest(repr(list(setup.cases)).encode()),
         "physics": model.mjcf_hash(),
     }
 
 
-def seconds_per_epoch(learner: Learner, track: Track, seeds: Sequence[int]) -> float:
+def seconds_per_epoch(learner: Learner, setup: TrainingSetup, seeds: Sequence[int]) -> float:
     """Duration of an epoch [s], measured on the last epoch of the learner's `timing_run`; writes no files of a run."""
     timing_run, duration = learner.timing_run, 0.0
-    trainer = _trainer(timing_run, track, seeds)
+    trainer = _trainer(timing_run, setup, seeds)
     while trainer.epoch < timing_run.epochs:
         start = time.perf_counter()
         with as_agent_error(f"epoch {trainer.epoch + 1} of method {timing_run.label!r}"):
@@ -114,15 +114,21 @@ class _TrainingRun:
     """The epochs of a training that are not done yet."""
 
     def __init__(
-        self, learner: Learner, track: Track, checkpoints: Checkpoints, curve: Curve, report: Progress, watch: Watch
+        self,
+        learner: Learner,
+        setup: TrainingSetup,
+        checkpoints: Checkpoints,
+        curve: Curve,
+        report: Progress,
+        watch: Watch,
     ) -> None:
-        self._learner, self._track, self._checkpoints, self._curve = learner, track, checkpoints, curve
+        self._learner, self._setup, self._checkpoints, self._curve = learner, setup, checkpoints, curve
         self._report, self._watch = report, watch
 
     def finish(self) -> None:
         """Trains to the last epoch, with a checkpoint and a point of the learning curve every period."""
-        trainer = _trainer(self._learner, self._track, self._checkpoints.seeds)
-        self._checkpoints.resume(trainer, self._track.device)
+        trainer = _trainer(self._learner, self._setup, self._checkpoints.seeds)
+        self._checkpoints.resume(trainer, self._setup.device)
         epochs, period = self._learner.epochs, self._learner.period
         self._curve.score_snapshots()
         note = self._last_point()
@@ -147,7 +153,7 @@ class _TrainingRun:
             rows = self._epoch(trainer)
             metric_rows.append(self._checkpoints.folder, rows)
             self._report(trainer.epoch, self._learner.epochs, note)
-        progress = TrainingProgress(last, self._learner.epochs, self._track.device)
+        progress = TrainingProgress(last, self._learner.epochs, self._setup.device)
         self._checkpoints.save(trainer, progress, rows, self._about())
 
     def _epoch(self, trainer: Trainer) -> list[dict[str, Any]]:
@@ -202,14 +208,14 @@ class _TrainingRun:
         }
 
     def _note_time(self, activity: str, epoch: int, seconds: float) -> None:
-        timing.append(self._checkpoints.folder, activity, epoch, seconds, self._track.device)
+        timing.append(self._checkpoints.folder, activity, epoch, seconds, self._setup.device)
 
 
-def _trainer(learner: Learner, track: Track, seeds: Sequence[int]) -> Trainer:
+def _trainer(learner: Learner, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
     if learner.epochs < 1 or learner.period < 1:
         raise AgentError(
             f"method {learner.label!r} needs at least one epoch and a period of at least one; "
             f"it has {learner.epochs} and {learner.period}"
         )
     with as_agent_error(f"trainer() of method {learner.label!r}"):
-        return learner.trainer(track, seeds)
+        return learner.trainer(setup, seeds)

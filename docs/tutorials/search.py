@@ -68,9 +68,9 @@ class Search:
         """A short training from which the harness estimates the time of a long one."""
         return replace(self, preset="smoke")
 
-    def trainer(self, track: bench.Track, seeds: Sequence[int]) -> SearchTrainer:
+    def trainer(self, setup: bench.TrainingSetup, seeds: Sequence[int]) -> SearchTrainer:
         """A trainer with 0 epochs done."""
-        return SearchTrainer(self, track, seeds)
+        return SearchTrainer(self, setup, seeds)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> Linear:
         """The agent of one seed's weights."""
@@ -80,10 +80,10 @@ class Search:
 class SearchTrainer:
     """The searches of S seeds: a mean and a spread of weights for each, (S, 3)."""
 
-    def __init__(self, search: Search, track: bench.Track, seeds: Sequence[int]) -> None:
+    def __init__(self, search: Search, setup: bench.TrainingSetup, seeds: Sequence[int]) -> None:
         """Starts from no knowledge: mean 0, spread 2."""
         self.epoch = 0
-        self._search, self._track, self._seeds = search, track, seeds
+        self._search, self._setup, self._seeds = search, setup, seeds
         self._mean, self._spread = np.zeros((len(seeds), 3)), np.full((len(seeds), 3), 2.0)
         self._frames = np.zeros(len(seeds))
 
@@ -96,8 +96,8 @@ class SearchTrainer:
     def _improve(self, k: int) -> dict[str, float]:
         """Plays random candidates of seed k on random cases, and moves towards the best."""
         rng = np.random.default_rng([self._seeds[k], self.epoch])  # A resumed training draws the same numbers.
-        rows = rng.choice(len(self._track.cases), self._search.episodes, replace=False)
-        cases = [self._track.cases[row] for row in rows]
+        rows = rng.choice(len(self._setup.cases), self._search.episodes, replace=False)
+        cases = [self._setup.cases[row] for row in rows]
         candidates = rng.normal(self._mean[k], self._spread[k], (self._search.candidates, 3))
         returns = np.array([self._play(k, weights, cases) for weights in candidates])
         elite = candidates[np.argsort(returns)[-ELITE:]]
@@ -106,7 +106,7 @@ class SearchTrainer:
 
     def _play(self, k: int, weights: np.ndarray, cases: Sequence[bench.Case]) -> float:
         """The mean return of a candidate."""
-        played = bench.rollout(Linear(weights), self._track.source, cases, threads=self._track.threads)
+        played = bench.rollout(Linear(weights), self._setup.source, cases, threads=self._setup.threads)
         episodes = [episode for _, episode in played]
         self._frames[k] += sum(len(episode.actions) for episode in episodes)
         return float(np.mean([episode.score for episode in episodes]))

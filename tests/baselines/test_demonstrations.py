@@ -8,7 +8,7 @@ from baselines import demonstrations
 from baselines.demonstrations import Demonstrations
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
-from dextron_bench.methods.learners import Track
+from dextron_bench.methods.learners import TrainingSetup
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS[:3]]
@@ -32,8 +32,8 @@ def test_a_stream_has_whole_episodes_and_the_given_length():
 
 def test_demonstrations_equal_the_rollouts_of_experts_and_are_cached(tmp_path: Path):
     reported: list[tuple[int, int]] = []
-    track = Track(SOURCE, CASES, tmp_path, 1, report=lambda done, total, note: reported.append((done, total)))
-    demos = demonstrations.load(track)
+    setup = TrainingSetup(SOURCE, CASES, tmp_path, 1, report=lambda done, total, note: reported.append((done, total)))
+    demos = demonstrations.load(setup)
     assert reported == [(1, 3), (2, 3), (3, 3)]
     played = dict(rollout(ExpertAgent(), SOURCE, CASES, threads=1))
     for k in range(3):
@@ -43,8 +43,8 @@ def test_demonstrations_equal_the_rollouts_of_experts_and_are_cached(tmp_path: P
         np.testing.assert_array_equal(demos.rewards[rows][:-1], played[k].rewards.astype(np.float32))
     (file,) = tmp_path.iterdir()
     written = file.stat().st_mtime_ns
-    again = demonstrations.load(track)
+    again = demonstrations.load(setup)
     assert file.stat().st_mtime_ns == written
     np.testing.assert_array_equal(again.states, demos.states)
-    assert len(demonstrations.load(track, episodes=2)) == 2
+    assert len(demonstrations.load(setup, episodes=2)) == 2
     assert len(list(tmp_path.iterdir())) == 2

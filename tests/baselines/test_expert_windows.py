@@ -11,7 +11,7 @@ from baselines import expert_windows, openings
 from baselines.stopping import BadNumber, Stopping
 from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS
 from dextron_bench.experts.policies import Case, Expert
-from dextron_bench.methods.learners import Track
+from dextron_bench.methods.learners import TrainingSetup
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 
@@ -27,22 +27,24 @@ def test_closing_works_in_the_window_until_the_hand_goes_away():
 def test_openings_equal_those_with_forks_but_for_their_outcomes():
     cases = [Case(setting, Expert(1.2, 0.3), 2.0) for setting in SETTINGS]
     reported: list[tuple[int, int, str]] = []
-    track = Track(SOURCE, cases, Path(), 1, report=lambda *words: reported.append(words))
-    played = expert_windows.play(track, cases)
+    setup = TrainingSetup(SOURCE, cases, Path(), 1, report=lambda *words: reported.append(words))
+    played = expert_windows.play(setup, cases)
     forked = openings.play(SOURCE, SETTINGS, threads=1)
     assert reported[-1] == (len(cases), len(cases), "settings opened")
     assert len(played) == len(forked)
     for (states, labels), (expected, outcomes) in zip(played, forked, strict=True):
         np.testing.assert_array_equal(states, expected)
         np.testing.assert_array_equal(labels == NO_DECISION, outcomes == NO_DECISION)
-    assert expert_windows.play(track, [Case(SETTINGS[0], Expert(1.2, 0.3), 0.0)]) == []  # An empty window.
+    assert expert_windows.play(setup, [Case(SETTINGS[0], Expert(1.2, 0.3), 0.0)]) == []  # An empty window.
 
 
 def test_a_training_by_windows_plays_no_forks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(openings, "play", None)
     method = Stopping(labels="windows", settings=3)
     assert method.label == "stopping-windows-3"
-    trainer = method.trainer(Track(SOURCE, [Case(one, Expert(1.2, 0.3), 0.4) for one in SETTINGS], tmp_path, 1), [0])
+    trainer = method.trainer(
+        TrainingSetup(SOURCE, [Case(one, Expert(1.2, 0.3), 0.4) for one in SETTINGS], tmp_path, 1), [0]
+    )
     (metrics,) = trainer.advance()
     assert np.isfinite(metrics["stopping_loss"])
     assert list(tmp_path.iterdir()) == []

@@ -14,7 +14,7 @@ from baselines import cycle, demonstrations, rlpd
 from baselines.rlpd import BadEnsemble, Ensemble, Rlpd
 from baselines.sac import Batch
 from dextron_bench.experts.policies import Case, Expert
-from dextron_bench.methods.learners import Track
+from dextron_bench.methods.learners import TrainingSetup
 from dextron_bench.reaches.setting import Setting
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.tiny_benchmark import SOLVED
@@ -113,8 +113,8 @@ def test_seeds_trained_together_equal_seeds_trained_alone():
 def test_half_of_a_batch_comes_from_all_demonstrations(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """From the first update on; the paper's RLIL has only the demonstrations that were streamed so far."""
     cases = [Case(Setting(*row[:4]), Expert(*row[4:6]), row[6]) for row in SOLVED]
-    track = Track(SOURCE, cases, tmp_path, threads=1)
-    demos, trainer = demonstrations.load(track), Rlpd(batch=8).trainer(track, [0])
+    setup = TrainingSetup(SOURCE, cases, tmp_path, threads=1)
+    demos, trainer = demonstrations.load(setup), Rlpd(batch=8).trainer(setup, [0])
     assert isinstance(trainer, cycle.Cycle)
     rows = demos.transitions()
     first = demonstrations.Everything.of(demos).select(np.array([[0.0, 0.5, 1.0 - 1e-9]]), frames=0)

@@ -15,7 +15,7 @@ from baselines.stopping import BadNumber, Stopping, StoppingAgent
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Episode, Openings
 from dextron_bench.experts.policies import Case, Expert
-from dextron_bench.methods.learners import Arrays, Track
+from dextron_bench.methods.learners import Arrays, TrainingSetup
 from dextron_bench.reaches.setting import OFFSET, Setting
 from dextron_bench.splits.near_equal import NEAR_NOISE
 from dextron_bench.world import model, task
@@ -34,7 +34,9 @@ def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
     played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     reported: list[tuple[int, int]] = []
-    everything = Track(SOURCE, CASES * 2, tmp_path, 1, report=lambda done, total, note: reported.append((done, total)))
+    everything = TrainingSetup(
+        SOURCE, CASES * 2, tmp_path, 1, report=lambda done, total, note: reported.append((done, total))
+    )
     first_reach = SETTINGS[0].reach
     first = openings.load(everything, openings.settings_of(everything))
     assert len(first) == len(CASES)  # Each setting counts once.
@@ -44,7 +46,7 @@ def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
         np.testing.assert_array_equal(loaded[1], expected[1])
     monkeypatch.setattr(openings, "play", None)
     others = [case for case in CASES if case.setting.reach != first_reach]
-    part = openings.load(Track(SOURCE, others, tmp_path, threads=1), [case.setting for case in others])
+    part = openings.load(TrainingSetup(SOURCE, others, tmp_path, threads=1), [case.setting for case in others])
     expected = [outcomes for case, (_, outcomes) in zip(CASES, first, strict=True) if case in others]
     np.testing.assert_array_equal(np.concatenate([outcomes for _, outcomes in part]), np.concatenate(expected))
     file = min(tmp_path.iterdir())
@@ -77,14 +79,14 @@ def test_more_nearby_settings_begin_with_the_fewer_ones_and_share_their_files(
         return [(np.full((1, model.STATE), setting.offset_x), np.zeros(1, np.int8)) for setting in settings]
 
     monkeypatch.setattr(openings, "play", play)
-    track = Track(SOURCE, CASES, tmp_path, threads=1)
-    three, six = (openings.load_nearby(track, SETTINGS, copies) for copies in (3, 6))
+    setup = TrainingSetup(SOURCE, CASES, tmp_path, threads=1)
+    three, six = (openings.load_nearby(setup, SETTINGS, copies) for copies in (3, 6))
     assert len(played) == 2 * 5 * len(SETTINGS)  # Two batches of five, each played once.
     offsets = [[float(states[0, 0]) for states, _ in episodes] for episodes in six]
     near = [[*openings.nearby(one, 0), openings.nearby(one, 1)[0]] for one in SETTINGS]
     np.testing.assert_allclose(offsets, [[one.offset_x for one in group] for group in near], rtol=1e-6)
     assert [[float(states[0, 0]) for states, _ in episodes] for episodes in three] == [row[:3] for row in offsets]
-    assert openings.load_nearby(track, SETTINGS, 0) == [[] for _ in SETTINGS]
+    assert openings.load_nearby(setup, SETTINGS, 0) == [[] for _ in SETTINGS]
 
 
 def test_the_rule_closes_at_the_first_decision_within_its_distance():
@@ -211,7 +213,7 @@ def test_it_learns_from_what_closing_can_solve_on_generated_reaches_too(
     given: list[int] = []
     monkeypatch.setattr(stopping_trainer, "Decisions", lambda episodes, device: given.append(len(episodes)))
     monkeypatch.setattr(stopping_trainer, "StoppingTrainer", lambda *_: None)
-    Stopping(nearby=0, generated=7).trainer(Track(SOURCE, CASES, tmp_path, threads=1), [0])
+    Stopping(nearby=0, generated=7).trainer(TrainingSetup(SOURCE, CASES, tmp_path, threads=1), [0])
     assert asked == [(list(SETTINGS), 7)]
     solvable = sum((outcomes == SUCCEEDS).any() for _, outcomes in played.episodes())
     assert given == [len(SETTINGS) + solvable]

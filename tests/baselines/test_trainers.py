@@ -17,7 +17,7 @@ from baselines.rlpd import Rlpd
 from baselines.schedule import Exploration, Schedule
 from baselines.stopping import Stopping, StoppingAgent
 from dextron_bench.experts.policies import Case, Expert
-from dextron_bench.methods.learners import Track, Trainer
+from dextron_bench.methods.learners import Trainer, TrainingSetup
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
@@ -37,18 +37,18 @@ def short_epochs(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def trainer(kind: str, folder: Path, seeds: tuple[int, ...] = (0, 1), schedule: Schedule = SCHEDULE) -> Trainer:
-    track = Track(SOURCE, CASES, folder, threads=1)
+    setup = TrainingSetup(SOURCE, CASES, folder, threads=1)
     if kind == "bc":
-        return Cloning(load(track), seeds)
+        return Cloning(load(setup), seeds)
     if kind == "dagger":
-        return Aggregation(track, load(track), seeds)
+        return Aggregation(setup, load(setup), seeds)
     if kind == "stopping":
-        return Stopping().trainer(track, seeds)
+        return Stopping().trainer(setup, seeds)
     if kind == "rlpd":
-        return Rlpd(critics=3, updates=2, batch=16).trainer(track, seeds)
+        return Rlpd(critics=3, updates=2, batch=16).trainer(setup, seeds)
     if kind == "held":
-        return rl.trainer(track, seeds, schedule, 9, Exploration(hold=7, share=0.5), critics=2)
-    return rl.trainer(track, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
+        return rl.trainer(setup, seeds, schedule, 9, Exploration(hold=7, share=0.5), critics=2)
+    return rl.trainer(setup, seeds, schedule, demonstrated=0 if kind == "rl" else 9)
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,7 @@ def test_updates_start_after_the_warm_start(tmp_path: Path):
     assert second["frames"] == 2 * FRAMES
     assert "value_loss" in first
     assert "value_loss" in second
-    late = rl.trainer(Track(SOURCE, CASES, tmp_path, threads=1), [0], Schedule(2, 100, 1), 0)
+    late = rl.trainer(TrainingSetup(SOURCE, CASES, tmp_path, threads=1), [0], Schedule(2, 100, 1), 0)
     before = late.weights()[0]["policy.4"]
     assert "value_loss" not in late.advance()[0]
     np.testing.assert_array_equal(late.weights()[0]["policy.4"], before)
@@ -145,8 +145,8 @@ def test_updates_start_after_the_warm_start(tmp_path: Path):
 
 def test_held_noise_is_renewed_every_hold_steps_and_updates_begin_after_a_batch(tmp_path: Path):
     """In the warm start the noise is the action, so the actions themselves are held, from the start of each episode."""
-    track = Track(SOURCE, CASES, tmp_path, threads=1)
-    learner = rl.trainer(track, [0], Schedule(4, 400, 1), 0, Exploration(hold=7))
+    setup = TrainingSetup(SOURCE, CASES, tmp_path, threads=1)
+    learner = rl.trainer(setup, [0], Schedule(4, 400, 1), 0, Exploration(hold=7))
     (metrics,) = learner.advance()
     assert "value_loss" in metrics
     journal = learner.journal()
@@ -158,10 +158,10 @@ def test_held_noise_is_renewed_every_hold_steps_and_updates_begin_after_a_batch(
 
 
 def test_after_the_warm_start_a_share_of_the_episodes_holds_its_noise(tmp_path: Path):
-    track = Track(SOURCE, CASES, tmp_path, threads=1)
+    setup = TrainingSetup(SOURCE, CASES, tmp_path, threads=1)
     noises = []
     for share in (0.0, 1.0):
-        learner = rl.trainer(track, [0], Schedule(4, 0, 1), 0, Exploration(hold=40, share=share))
+        learner = rl.trainer(setup, [0], Schedule(4, 0, 1), 0, Exploration(hold=40, share=share))
         fresh = np.random.default_rng(0).normal(size=(40, 1, 1))
         held = []
         for noise in fresh:
@@ -180,7 +180,7 @@ def test_the_imitation_loss_by_hand():
 def test_behaviour_cloning_recovers_an_expert(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """After a thousand updates on one expert's demonstrations, the actions differ by less than 0.1 (RMS)."""
     monkeypatch.setattr("baselines.bc.STEPS", 250)
-    demos = load(Track(SOURCE, CASES, tmp_path, threads=1))
+    demos = load(TrainingSetup(SOURCE, CASES, tmp_path, threads=1))
     cloning = Cloning(demos, [0])
     for _ in range(4):
         cloning.advance()

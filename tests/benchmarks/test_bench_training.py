@@ -23,7 +23,7 @@ from baselines import rl
 from baselines.cycle import FRAMES
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import Schedule
-from dextron_bench.methods.learners import Track
+from dextron_bench.methods.learners import TrainingSetup
 from tests.benchmarks.measure import Row, scaled, store_rows, time_in_turns, time_once, time_work
 from tests.benchmarks.workload import default_source, draw_cases
 
@@ -129,8 +129,8 @@ def _operations(product: Callable[[], torch.Tensor]) -> int:
 
 @pytest.mark.parametrize("agents", [1, 3])
 def test_cycles(benchmark: BenchmarkFixture, agents: int, tmp_path: Path) -> None:
-    track = Track(default_source(), draw_cases(24), tmp_path)
-    trainer = rl.trainer(track, range(agents), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
+    setup = TrainingSetup(default_source(), draw_cases(24), tmp_path)
+    trainer = rl.trainer(setup, range(agents), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
     trainer.advance()
     trainer.journal()
     rounds = max(1, round(3 * min(1.0, scaled(100) / 100)))
@@ -154,8 +154,8 @@ def test_cycles(benchmark: BenchmarkFixture, agents: int, tmp_path: Path) -> Non
 
 def test_threads(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     """The default is one thread for the products of torch; the physics has all threads in both."""
-    track = Track(default_source(), draw_cases(24), tmp_path)
-    trainer = rl.trainer(track, range(3), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
+    setup = TrainingSetup(default_source(), draw_cases(24), tmp_path)
+    trainer = rl.trainer(setup, range(3), Schedule(epochs=100, warm_start=FRAMES, period=1), demonstrated=3)
     trainer.advance()
     cores, before = len(os.sched_getaffinity(0)), torch.get_num_threads()
 

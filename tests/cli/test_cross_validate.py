@@ -13,7 +13,7 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods import registry
-from dextron_bench.methods.learners import Track
+from dextron_bench.methods.learners import TrainingSetup
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import Split
@@ -55,9 +55,9 @@ def test_a_method_learns_without_each_subject_and_plays_its_settings(
     toy: Any = registry.find_method(TOY)
     trainer = toy.trainer
 
-    def noting(self: Any, track: Track, seeds: Sequence[int]) -> Any:
-        learned.append({case.setting.reach for case in track.cases})
-        return trainer(self, track, seeds)
+    def noting(self: Any, setup: TrainingSetup, seeds: Sequence[int]) -> Any:
+        learned.append({case.setting.reach for case in setup.cases})
+        return trainer(self, setup, seeds)
 
     monkeypatch.setattr(toy, "trainer", noting)
     assert main.main(validate("--seed", "0", "3", "--json")) == 0

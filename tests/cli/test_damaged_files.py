@@ -16,7 +16,7 @@ import pytest
 from baselines import demonstrations
 from dextron_bench.cli import main
 from dextron_bench.methods import weights
-from dextron_bench.methods.learners import Track
+from dextron_bench.methods.learners import TrainingSetup
 from dextron_bench.splits.loading import load_split
 from dextron_bench.storage.atomic import DamagedFile
 from tests.helpers import tiny_benchmark, tiny_training
@@ -125,13 +125,13 @@ def test_a_name_on_the_disk_that_is_not_utf_8_is_one_line():
 
 @pytest.mark.parametrize("damage", [lambda content: b"", lambda content: content[:-1] + bytes([content[-1] ^ 1])])
 def test_a_damaged_cache_of_demonstrations_is_named(finished: Path, tmp_path: Path, damage: Callable[[bytes], bytes]):
-    track = Track(SOURCE, load_split("synthetic", "train").cases, tmp_path / "cache", 1, "cpu")
-    whole = demonstrations.load(track)
+    setup = TrainingSetup(SOURCE, load_split("synthetic", "train").cases, tmp_path / "cache", 1, "cpu")
+    whole = demonstrations.load(setup)
     [file] = (tmp_path / "cache").iterdir()
-    assert len(demonstrations.load(track)) == len(whole) == 2
+    assert len(demonstrations.load(setup)) == len(whole) == 2
     file.write_bytes(damage(file.read_bytes()))
     with pytest.raises(DamagedFile, match=rf"{file.name} is damaged .*remove it and run again"):
-        demonstrations.load(track)
+        demonstrations.load(setup)
 
 
 def test_a_hidden_folder_is_never_published(here: Path):

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench.experts.policies import Case
-from dextron_bench.methods.learners import Learner, Track
+from dextron_bench.methods.learners import Learner, TrainingSetup
 from dextron_bench.reaches import sources
 from dextron_bench.splits.loading import Split, load_split
 from dextron_bench.training import loop
@@ -80,5 +80,5 @@ def train(
     folder: Path, learner: Learner = QUICK, device: str = "cpu", val: Split | None = None, **options: Any
 ) -> Checkpoints:
     """Trains SEEDS in a folder."""
-    track = Track(SOURCE, load_split("synthetic", "train").cases, folder / "cache", threads=1, device=device)
-    return loop.train(learner, track, SEEDS, folder, val or load_split("synthetic", "val"), **options)
+    setup = TrainingSetup(SOURCE, load_split("synthetic", "train").cases, folder / "cache", threads=1, device=device)
+    return loop.train(learner, setup, SEEDS, folder, val or load_split("synthetic", "val"), **options)

@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from dextron_bench.methods.agents import Agent
-from dextron_bench.methods.learners import Arrays, Track, Trainer
+from dextron_bench.methods.learners import Arrays, Trainer, TrainingSetup
 from dextron_bench.world import model
 
 EPOCHS = {"paper": 12, "quick": 5, "smoke": 2}
@@ -66,9 +66,9 @@ class Toy:
         """The same learner with the shortest preset."""
         return replace(self, preset="smoke")
 
-    def trainer(self, track: Track, seeds: Sequence[int]) -> Trainer:
+    def trainer(self, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
         """A new trainer."""
-        return ToyTrainer(self, len(track.cases), seeds)
+        return ToyTrainer(self, len(setup.cases), seeds)
 
     def policy(self, weights: Mapping[str, np.ndarray]) -> Agent:
         """The agent that plays the map."""

@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from dextron_bench import Track, load_split, open_source
+from dextron_bench import TrainingSetup, load_split, open_source
 from dextron_bench.storage import hashing
 from dextron_bench.world import task
 
@@ -25,14 +25,14 @@ def search(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 @pytest.fixture
-def track(tmp_path: Path) -> Track:
+def training_setup(tmp_path: Path) -> TrainingSetup:
     """A few cases of minimum-jerk reaches."""
-    return Track(open_source("minjerk"), load_split("minjerk", "val").cases[:4], tmp_path, threads=1)
+    return TrainingSetup(open_source("minjerk"), load_split("minjerk", "val").cases[:4], tmp_path, threads=1)
 
 
-def test_a_resumed_training_equals_an_unbroken_one(search: ModuleType, track: Track):
+def test_a_resumed_training_equals_an_unbroken_one(search: ModuleType, training_setup: TrainingSetup):
     method = search.Search(preset="smoke", candidates=4, episodes=1)
-    unbroken, first, second = (method.trainer(track, [0]) for _ in range(3))
+    unbroken, first, second = (method.trainer(training_setup, [0]) for _ in range(3))
     metrics = [unbroken.advance(), unbroken.advance()]
     assert first.advance() == metrics[0]
     second.restore(first.state(), [first.journal()])

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dextron_bench.methods.learners import Track, Trainer
+from dextron_bench.methods.learners import Trainer, TrainingSetup
 from dextron_bench.splits import strata
 from dextron_bench.storage import tensors
 from dextron_bench.storage.folder_config import FolderMismatch
@@ -92,17 +92,17 @@ def test_unfinished_trainings_are_listed_with_the_epochs_left(job: TrainingJob, 
 def test_a_device_that_the_machine_does_not_have_is_refused(job: TrainingJob, monkeypatch: pytest.MonkeyPatch):
     torch = pytest.importorskip("torch")
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    assert TrainingJob(QUICK, "synthetic", job.runs, device="auto").track().device == "cpu"
+    assert TrainingJob(QUICK, "synthetic", job.runs, device="auto").setup().device == "cpu"
     with pytest.raises(NoDevice, match="this machine has no CUDA device"):
-        TrainingJob(QUICK, "synthetic", job.runs, device="cuda").track()
+        TrainingJob(QUICK, "synthetic", job.runs, device="cuda").setup()
 
 
 def test_a_learner_reports_what_it_prepares(job: TrainingJob, monkeypatch: pytest.MonkeyPatch):
     make, reported = Toy.trainer, []
 
-    def prepare(self: Toy, track: Track, seeds: Sequence[int]) -> Trainer:
-        track.report(3, 7, "preparing")
-        return make(self, track, seeds)
+    def prepare(self: Toy, setup: TrainingSetup, seeds: Sequence[int]) -> Trainer:
+        setup.report(3, 7, "preparing")
+        return make(self, setup, seeds)
 
     monkeypatch.setattr(Toy, "trainer", prepare)
     job.run([0], lambda done, total, note="": reported.append((done, total, note)))
@@ -116,8 +116,8 @@ def test_a_training_without_a_subject_has_other_rows_and_folders_and_the_same_ca
         strata, "strata", lambda split: pd.DataFrame({"subject": [case.setting.reach for case in split.cases]})
     )
     without = replace(job, without="a")
-    assert {case.setting.reach for case in without.track().cases} == {"b"}
-    assert {case.setting.reach for case in job.track().cases} == {"a", "b"}
+    assert {case.setting.reach for case in without.setup().cases} == {"b"}
+    assert {case.setting.reach for case in job.setup().cases} == {"a", "b"}
     assert without.run_folder(3).path == job.runs / "without/a/toy-0.1/synthetic/seed3"
     assert without.training_folder([3]).is_relative_to(job.runs / "without/a")
-    assert without.track().cache == job.track().cache
+    assert without.setup().cache == job.setup().cache

@@ -54,13 +54,14 @@ def test_a_module_in_the_working_folder_plays_and_may_import_its_package(
 
 def test_a_file_may_hold_a_learner_and_its_agent(agent_spec: Callable[[str], str]):
     (episode,) = play(
-        agent_spec("from dextron_bench.methods.learners import Track; return np.zeros((len(states), 1))"), CASES[:1]
+        agent_spec("from dextron_bench.methods.learners import TrainingSetup; return np.zeros((len(states), 1))"),
+        CASES[:1],
     )
     assert episode.failure == ""
 
 
 def test_an_agent_may_import_the_public_names_of_policies(agent_spec: Callable[[str], str]):
-    names = "Agent, Case, Expert, ExpertAgent, Learner, Perceptron, SuccessModel, Trainer, Track"
+    names = "Agent, Case, Expert, ExpertAgent, Learner, Perceptron, SuccessModel, Trainer, TrainingSetup"
     (episode,) = play(agent_spec(f"from dextron_bench import {names}; return np.zeros((len(states), 1))"), CASES[:1])
     assert episode.failure == ""
 
