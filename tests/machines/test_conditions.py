@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -28,7 +29,7 @@ COMMANDS = (
     "run --method reflex --split val --record 1 --quiet",
     "recordings list",
     f"recordings export {RECORDING} --into picture.gif --width 64 --height 48 --quiet",
-    f"run --method {TOY} --preset smoke --split val --record 0 --quiet",
+    f"run --method {shlex.quote(TOY)} --preset smoke --split val --record 0 --quiet",
     "runs export --into exported",
 )
 
