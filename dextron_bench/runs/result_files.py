@@ -62,9 +62,9 @@ def results(runs: Path) -> Iterator[dict[str, Any]]:
     return (read_result(run.result) for run in finished(runs))
 
 
-def finished(runs: Path) -> list[RunFolder]:
+def finished(runs: Path, label: str = "*") -> list[RunFolder]:
     """The run folders below a folder of runs that hold a result, sorted."""
-    return [run for run in run_folders(runs) if run.result.exists()]
+    return [run for run in run_folders(runs, label) if run.result.exists()]
 
 
 def read_result(file: Path) -> dict[str, Any]:

@@ -112,7 +112,8 @@ def test_a_folder_with_two_methods_is_refused(runs: Path):
 
 def test_finished_runs_are_those_with_a_result(runs: Path):
     (runs / "bc" / "real" / "seed2").mkdir()
-    assert [run.seed for run in result_files.finished(runs)] == [0, 1, 0]
+    assert [run.seed for run in result_files.finished(runs, "bc")] == [0, 1, 0]
+    assert result_files.finished(runs, "rl") == []
 
 
 def test_the_scores_of_a_split_are_computed_from_its_rows():
