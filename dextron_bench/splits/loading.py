@@ -51,10 +51,9 @@ class Split(Rows):
 
     def case(self, row: int) -> Case:
         """The case of a row; raises UnknownRow."""
-        try:
-            return super(Split, self).case(row)  # A class with slots is made anew, so `super()` finds another.
-        except UnknownRow as error:
-            raise UnknownRow(f"{self.name} of {self.reaches} reaches: {error}") from None
+        if not 0 <= row < len(self):
+            raise UnknownRow(f"{self.name} of {self.reaches} reaches has rows 0 to {len(self) - 1}, not {row}")
+        return self.cases[row]
 
 
 def known_splits(reaches: str) -> tuple[str, ...]:

@@ -38,7 +38,7 @@ def test_rows_keep_their_order_their_track_and_their_bottles():
 
 
 def test_a_row_that_does_not_exist_is_refused():
-    with pytest.raises(UnknownRow, match=r"test\+x of synthetic reaches: there are rows 0 to 2, not 3"):
+    with pytest.raises(UnknownRow, match=r"test\+x of synthetic reaches has rows 0 to 2, not 3"):
         SPLIT.rows([3])
     with pytest.raises(UnknownRow):
         SPLIT.rows([-1])
