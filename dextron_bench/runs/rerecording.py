@@ -89,9 +89,11 @@ def _record(group: pd.DataFrame) -> Iterator[None]:
     rows = group.to_dict("records")
     run, reaches = RunFolder(Path(rows[0]["folder"])), rows[0]["reaches"]
     source, split = sources.open_source(reaches), load_split(reaches, rows[0]["split"])
-    about = selection.run_identity(run)
+    about, settings = selection.run_identity(run), from_frame(group)
     for place, episode in replay(source, split.rows(row["row"] for row in rows), group["actions"].tolist()):
         row = rows[place]
+        if episode.setting != settings[place]:
+            raise Unplayable(f"{row['split']} row {row['row']} of {row['folder']} is no setting of this split")
         recording_files.record(run, source, split, row["row"], _as_recorded(row, episode), about)
         yield
 

@@ -1,4 +1,4 @@
-"""Every command that plays a split plays its conditions, too: its episodes equal those of `run`, bit for bit."""
+"""Every command that plays a split plays its conditions, too: it plays the episodes of `run`, bit for bit."""
 
 from __future__ import annotations
 

@@ -78,10 +78,10 @@ def test_what_takes_a_split_apart_is_found(code: str, lines: list[int]):
 
 
 def test_nothing_hands_on_the_cases_of_a_split_without_their_conditions():
-    found = [
+    faults = [
         f"{place}:{line}"
         for file in sorted(PACKAGE.rglob("*.py"))
         if not (place := str(file.relative_to(PACKAGE))).startswith(tuple(MAY_TAKE_APART))
         for line in taken_apart(file.read_text(encoding="utf-8"))
     ]
-    assert found == []
+    assert faults == []
