@@ -13,6 +13,7 @@ from dextron_bench import recording
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches import sources
+from dextron_bench.reaches.setting import from_frame
 from dextron_bench.runs import recording_files, result_files, selection
 from dextron_bench.splits.loading import load_split
 from dextron_bench.storage import provenance, schemas
