@@ -32,7 +32,7 @@ from tests.helpers.forged_bundles import AGENT
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.toy_learner import ToyTrainer
 
-COUNT, THOROUGH = 10, 300  # Mutations of each kind of file.
+COUNT, THOROUGH = 7, 300  # Mutations of each kind of file.
 LONGEST = 30  # [s] that a command may take.
 MOST_MEMORY = 2**30  # Bytes; the memory of this process, and of all that it starts, may grow by so much.
 TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--record", "0"]
