@@ -163,9 +163,9 @@ def _rounded(values: Iterable[float | None], digits: int = 2) -> list[str]:
     return ["" if value is None or math.isnan(value) else f"{value:.{digits}f}" for value in values]
 
 
-def _print_exemplars(chosen: Mapping[str, PredictedEpisode], split: Rows) -> None:
+def _print_exemplars(chosen: Mapping[str, PredictedEpisode], played: Rows) -> None:
     columns = ["kind", "player", "row", "reach", "return", "cause", "correct steps [%]"]
-    numbers = {case.setting: row for row, case in enumerate(split.cases)}
+    numbers = {case.setting: row for row, case in enumerate(played.cases)}
     rows = []
     for kind, predicted in chosen.items():
         episode = predicted.episode

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches.setting import Setting, Source, checked_setting
 from dextron_bench.splits.rows import Rows
-from dextron_bench.splits.tracks import PLAIN
 
 UNUSED = Expert(1.0, 0.0)  # The expert of a case in which no expert acts.
 
@@ -56,7 +54,7 @@ def replay(
     sequences = [_sequence(numbers) for numbers in actions]
     if len(sequences) != len(rows):
         raise ValueError(f"actions must have one sequence for each of {len(rows)} settings; got {len(sequences)}")
-    return rollout(Script(sequences), source, replace(rows, track=PLAIN), threads=threads)
+    return rollout(Script(sequences), source, Rows(cases=rows.cases, bottles=rows.bottles), threads=threads)
 
 
 def _rows_of(settings: Sequence[Setting]) -> Rows:

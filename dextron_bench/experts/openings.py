@@ -52,11 +52,15 @@ def play(
     source: Source, settings: Sequence[Setting], threads: int = 0, bottles: Sequence[Bottle] = ()
 ) -> list[Episode]:
     """The openings of some settings; `bottles` has one for each, or none if all have the model's."""
-    engine, paths = Engine(SLOTS, threads), [source.path(setting) for setting in settings]
+    engine = Engine(SLOTS, threads)
     return [
         episode
         for first in range(0, len(settings), TOGETHER)
-        for episode in _play_together(engine, paths[first : first + TOGETHER], bottles[first : first + TOGETHER])
+        for episode in _play_together(
+            engine,
+            [source.path(setting) for setting in settings[first : first + TOGETHER]],
+            bottles[first : first + TOGETHER],
+        )
     ]
 
 
