@@ -24,6 +24,7 @@ READERS = {"enumerate", "zip", "tuple", "list"}  # Functions that may receive ca
 MAY_TAKE_APART = {  # Files that may hand on cases alone, and why.
     "splits/": "they make and compare splits",
     "evaluation/rollout.py": "it plays them",
+    "evaluation/replay.py": "it drops the track: stored actions are those that arrived",
     "training/jobs.py": "a learner receives the cases of `train`, which has no conditions",
     "training/loop.py": "it hashes what a learner received",
 }
