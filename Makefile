@@ -15,7 +15,7 @@ INSTALL = $(VENV)/bin/python -m pip install -qq --disable-pip-version-check -c c
 TORCH_ALONE = $(INSTALL) --no-deps $(TORCH)
 DM_CONTROL = dm-control dm-env dm-tree lxml wrapt
 
-.PHONY: setup run test check bench docs
+.PHONY: setup run test check bench rebuild docs
 .DEFAULT_GOAL := test
 
 RUNTIME = $(VENV)/.runtime
@@ -61,6 +61,10 @@ bench: $(DEVELOPMENT)
 	mkdir -p .benchmarks
 	$(PYTHON) -m pytest -q -o addopts= tests/benchmarks --benchmark-json=.benchmarks/bench.json $(ARGS)
 	$(PYTHON) tests/benchmarks/table.py .benchmarks/bench.json docs/benchmarks.md
+
+# Everything that depends on the physics, as far as it is stale (docs/rebuild.md): `make rebuild ARGS=--list` shows it.
+rebuild: $(RUNTIME)
+	$(PYTHON) -m tools.rebuild $(ARGS)
 
 # The documentation site, in site/. To read it: python3 -m http.server -d site
 docs: $(DEVELOPMENT)

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from dextron_bench.cli import main, output
+from dextron_bench.cli import main
+from dextron_bench.cli.support import output
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
 from tests.helpers import abilities, forged_bundles, tiny_benchmark, tiny_training

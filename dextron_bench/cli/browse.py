@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.output import print_json
-from dextron_bench.cli.serving import serve
+from dextron_bench.cli.support.exit_codes import DONE
+from dextron_bench.cli.support.output import print_json
+from dextron_bench.cli.support.serving import serve
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dextron_bench.browse.search import Search
+    from dextron_bench.catalogue.browse.search import Search
 
 PATIENCE = 2.0  # [s] in which a viewer that cannot start has ended.
 
@@ -53,9 +53,9 @@ class Browse:
     """Print the matching episodes as JSON and serve nothing."""
 
     def __call__(self) -> int:
-        from dextron_bench.browse.search import Search
-        from dextron_bench.cli.leaderboard import none_for_nan
-        from dextron_bench.runs import episode_catalogue
+        from dextron_bench.catalogue import episode_catalogue
+        from dextron_bench.catalogue.browse.search import Search
+        from dextron_bench.cli.leaderboard.show import none_for_nan
 
         if not self.json and not self.web:
             from dextron_bench.recording import require_screen
@@ -72,9 +72,9 @@ class Browse:
         return DONE
 
     def _serve(self, episodes: pd.DataFrame, search: Search) -> None:
-        from dextron_bench.browse.site import BrowseSite
-        from dextron_bench.leaderboard.local_server import LocalServer
+        from dextron_bench.catalogue.browse.site import BrowseSite
         from dextron_bench.recording import web_viewer_files
+        from dextron_bench.web.local_server import LocalServer
 
         site = BrowseSite(episodes, viewer=web_viewer_files()) if self.web else BrowseSite(episodes, _show)
         with closing(site), LocalServer(site, self.port) as server:

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import tyro
 
-from dextron_bench.cli.exit_codes import DIFFERS, DONE
-from dextron_bench.cli.output import print_json
+from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
+from dextron_bench.cli.support.output import print_json
 from dextron_bench.reaches.sources import RankedSource
 
 
@@ -44,9 +44,9 @@ class Check:
     """Print the results of the checks as JSON."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard.submission import conformance, entry
         from dextron_bench.methods.isolation.isolated_agent import Limits
         from dextron_bench.methods.isolation.launch import prepare_launch
+        from dextron_bench.submissions import conformance, entry
 
         settings = entry.settings_from_json(self.agent, self.settings, self.reaches)
         launch = prepare_launch(self.agent, settings, self.weights, self.trust)

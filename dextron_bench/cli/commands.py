@@ -9,35 +9,30 @@ from dextron_bench.cli import (
     check,
     compare,
     cross_validate,
-    data,
-    data_export,
-    data_synthetic,
     doctor,
     figures,
-    leaderboard,
-    leaderboard_fresh,
-    leaderboard_tracks,
-    leaderboard_verify,
     mc,
     new_agent,
     plan,
-    rebuild,
-    recordings,
-    recordings_choose,
     run,
-    runs,
-    runs_compare,
-    runs_edit,
     splits,
     submit,
-    success,
-    success_eval,
     sweep,
     view,
     windows,
 )
 from dextron_bench.cli import eval as evaluation
 from dextron_bench.cli import list as listing
+from dextron_bench.cli.data import export, sources, synthetic
+from dextron_bench.cli.leaderboard import fresh, tracks, verify
+from dextron_bench.cli.leaderboard import show as leaderboard
+from dextron_bench.cli.recordings import choose
+from dextron_bench.cli.recordings import show as recordings
+from dextron_bench.cli.runs import compare as runs_compare
+from dextron_bench.cli.runs import edit
+from dextron_bench.cli.runs import show as runs
+from dextron_bench.cli.success import evaluation as success_eval
+from dextron_bench.cli.success import model as success
 
 
 class Command(Protocol):
@@ -58,8 +53,8 @@ COMMANDS: dict[str, type[Command] | Group] = {
         "add a submission to it; play fresh settings and tracks.",
         {
             **{"show": leaderboard.Show, "build": leaderboard.Build, "serve": leaderboard.Serve},
-            **{"verify": leaderboard_verify.Verify, "add": leaderboard_verify.Add},
-            **{"fresh": leaderboard_fresh.Fresh, "tracks": leaderboard_tracks.Tracks},
+            **{"verify": verify.Verify, "add": verify.Add},
+            **{"fresh": fresh.Fresh, "tracks": tracks.Tracks},
         },
     ),
     "new-agent": new_agent.NewAgent,
@@ -71,33 +66,36 @@ COMMANDS: dict[str, type[Command] | Group] = {
     "browse": browse.Browse,
     "recordings": (
         "Recordings: list them, export one as a film or a table, choose a few from the runs.",
-        {"list": recordings.List, "export": recordings.Export, "choose": recordings_choose.Choose},
+        {"list": recordings.List, "export": recordings.Export, "choose": choose.Choose},
     ),
     "list": listing.List,
     "runs": (
         "Runs: list, show and compare them, find the best, mark them, put them away, export them.",
         {
             **{"list": runs.List, "show": runs.Show, "compare": runs_compare.Compare, "best": runs.Best},
-            **{"tag": runs_edit.Tag, "note": runs_edit.Note, "archive": runs_edit.Archive, "rm": runs_edit.Remove},
-            "export": runs_edit.Export,
+            **{"tag": edit.Tag, "note": edit.Note, "archive": edit.Archive, "rm": edit.Remove},
+            "export": edit.Export,
         },
     ),
     "data": (
         "Reaches: import or download the recorded ones, describe a source, fit and evaluate the synthetic ones; "
         "export episodes for offline learning.",
         {
-            **{"import": data.Import, "fetch": data.Fetch, "info": data.Info, "agreement": data.Agreement},
-            **{"fit": data_synthetic.Fit, "likeness": data_synthetic.Likeness, "export": data_export.Export},
+            **{"import": sources.Import, "fetch": sources.Fetch, "info": sources.Info},
+            "agreement": sources.Agreement,
+            **{"fit": synthetic.Fit, "likeness": synthetic.Likeness, "export": export.Export},
         },
     ),
     "mc": mc.MonteCarlo,
     "splits": splits.Splits,
     "success": (
         "The success model: generate its data set, train it, evaluate it, explain episodes with it.",
-        {"data": success.Data, "train": success.Train, "eval": success_eval.Eval, "explain": success_eval.Explain},
+        {
+            **{"data": success.Data, "train": success.Train},
+            **{"eval": success_eval.Eval, "explain": success_eval.Explain},
+        },
     ),
     "figures": figures.Figures,
     "windows": windows.Windows,
-    "rebuild": rebuild.Rebuild,
     "doctor": doctor.Doctor,
 }

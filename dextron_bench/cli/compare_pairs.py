@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from dextron_bench.cli.compare import DIFFERENCE, HOLM, difference_text
-from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.output import print_json, print_table
+from dextron_bench.cli.support.exit_codes import DONE
+from dextron_bench.cli.support.output import print_json, print_table
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
-from dextron_bench.cli.method_flags import settings_dict
-from dextron_bench.cli.output import print_json, print_markdown, print_table, progress_bar
+from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
+from dextron_bench.cli.support.method_flags import settings_dict
+from dextron_bench.cli.support.output import print_json, print_markdown, print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:

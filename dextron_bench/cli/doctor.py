@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 
-from dextron_bench.cli.exit_codes import DIFFERS, DONE
-from dextron_bench.cli.output import print_json, print_table
-from dextron_bench.storage import programs
+from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
+from dextron_bench.cli.support.output import print_json, print_table
+from dextron_bench.processes import programs
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.success_eval import NoRows
+from dextron_bench.cli.success.evaluation import NoRows
+from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.reaches.sources import RankedSource
 
 

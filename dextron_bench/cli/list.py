@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.output import print_table
+from dextron_bench.cli.support.exit_codes import DONE
+from dextron_bench.cli.support.output import print_table
 
 
 @dataclass(frozen=True)

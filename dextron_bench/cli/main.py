@@ -16,12 +16,12 @@ from typing import Annotated, Any, Union
 
 import tyro
 
-from dextron_bench.cli import method_flags, places, streams, usage
 from dextron_bench.cli.commands import COMMANDS, Command, Group
-from dextron_bench.cli.exit_codes import BUG, DONE, INTERRUPTED, USAGE
-from dextron_bench.cli.output import print_warning
-from dextron_bench.storage import programs
-from dextron_bench.storage.limited_process import memory_advice
+from dextron_bench.cli.support import method_flags, places, streams, usage
+from dextron_bench.cli.support.exit_codes import BUG, DONE, INTERRUPTED, USAGE
+from dextron_bench.cli.support.output import print_warning
+from dextron_bench.processes import programs
+from dextron_bench.processes.limited_process import memory_advice
 
 # The products of NumPy and of torch are small here: more threads would mostly wait for each other, above all on a busy
 # machine.

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from dextron_bench.cli.exit_codes import DONE
+from dextron_bench.cli.support.exit_codes import DONE
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class NewAgent:
     """The new folder."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard.submission import starter
+        from dextron_bench.submissions import starter
 
         for file in starter.copy_template(self.folder):
             print(file)

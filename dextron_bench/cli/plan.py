@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.output import print_json, print_table
+from dextron_bench.cli.support.exit_codes import DONE
+from dextron_bench.cli.support.output import print_json, print_table
 from dextron_bench.reaches.sources import SourceName
 
 TOO_MANY = "more seeds are needed"

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from dextron_bench.cli import clusters, shares
-from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
-from dextron_bench.cli.leaderboard import print_beside_published
-from dextron_bench.cli.method_flags import settings_dict
-from dextron_bench.cli.output import print_json, print_table, print_warning, progress_bar
+from dextron_bench.cli.leaderboard.show import print_beside_published
+from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
+from dextron_bench.cli.support.method_flags import settings_dict
+from dextron_bench.cli.support.output import print_json, print_table, print_warning, progress_bar
 from dextron_bench.reaches.sources import SourceName
 
 TrackerName = Literal["rerun", "tensorboard", "trackio", "wandb"]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.output import print_table
+from dextron_bench.cli.support.exit_codes import DONE
+from dextron_bench.cli.support.output import print_table
 from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli import clusters, shares
-from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
-from dextron_bench.cli.leaderboard import print_rows
-from dextron_bench.cli.output import progress_bar
-from dextron_bench.leaderboard.submission.declaration import Declaration
+from dextron_bench.cli.leaderboard.show import print_rows
+from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
+from dextron_bench.cli.support.output import progress_bar
 from dextron_bench.reaches.sources import RankedSource
+from dextron_bench.submissions.declaration import Declaration
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dextron_bench.leaderboard.submission.entry import Entry
     from dextron_bench.methods.isolation.isolated_agent import Limits
+    from dextron_bench.submissions.entry import Entry
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,11 @@ class Submit:
     """Settings of a method or class as JSON, such as '{"near": 0.05}'."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard.submission import playing
         from dextron_bench.methods.isolation.isolated_agent import Limits
         from dextron_bench.runs import run_files
         from dextron_bench.scores import cells
         from dextron_bench.storage.run_folder import RunFolder
+        from dextron_bench.submissions import playing
 
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
@@ -113,7 +113,7 @@ class Submit:
             submissions.play(cluster, entry, self.runs, self.record, limits, progress)
 
     def _entry(self) -> Entry:
-        from dextron_bench.leaderboard.submission import entry as submission_entry
+        from dextron_bench.submissions import entry as submission_entry
 
         seeds = tuple(dict.fromkeys(self.seed))
         settings = submission_entry.settings_from_json(self.agent, self.settings, self.reaches)

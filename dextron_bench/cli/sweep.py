@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from dextron_bench.cli import clusters
-from dextron_bench.cli.exit_codes import DONE, EPISODES_FAILED
-from dextron_bench.cli.method_flags import settings_dict
-from dextron_bench.cli.output import print_json, print_table, progress_bar
+from dextron_bench.cli.support import clusters
+from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
+from dextron_bench.cli.support.method_flags import settings_dict
+from dextron_bench.cli.support.output import print_json, print_table, progress_bar
 from dextron_bench.cli.sweep_output import in_words
 from dextron_bench.reaches.sources import SourceName
 

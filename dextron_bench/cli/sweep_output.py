@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dextron_bench.cli.output import print_table
+from dextron_bench.cli.support.output import print_table
 
 if TYPE_CHECKING:
     from dextron_bench.sweeps.sweep import SweepFile

@@ -12,7 +12,7 @@ from typing import Any
 
 import tyro
 
-from dextron_bench.cli import usage
+from dextron_bench.cli.support import usage
 from dextron_bench.methods.settings import default
 from dextron_bench.sweeps.space import BadSpace, Choices, Range, Space
 

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli.episode_flags import EpisodeFlags
-from dextron_bench.cli.exit_codes import DIFFERS, DONE
-from dextron_bench.cli.output import print_table, print_warning, progress_bar
-from dextron_bench.cli.serving import serve
+from dextron_bench.cli.support.episode_flags import EpisodeFlags
+from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
+from dextron_bench.cli.support.output import print_table, print_warning, progress_bar
+from dextron_bench.cli.support.serving import serve
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dextron_bench.runs.selection import EpisodeFilter
+    from dextron_bench.catalogue.selection import EpisodeFilter
 
 
 @dataclass(frozen=True)
@@ -85,20 +85,20 @@ class View(EpisodeFlags):
 
     def _places(self) -> list[Path]:
         """The places of recordings; a submission is unpacked in the folder of runs."""
-        from dextron_bench.leaderboard.submission.unpacking import unpack_for_viewing
+        from dextron_bench.submissions.unpacking import unpack_for_viewing
 
         places = self.place or (self.runs,)
         return [unpack_for_viewing(place, self.runs) if place.suffix == ".zip" else place for place in places]
 
     def _recordings(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
-        from dextron_bench.runs import selection
+        from dextron_bench.catalogue import selection
 
         if episode_filter == selection.EpisodeFilter():
             return selection.recordings(places)
         return self._select(places, episode_filter)
 
     def _side_by_side(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> Path:
-        from dextron_bench.runs import selection, side_by_side
+        from dextron_bench.catalogue import selection, side_by_side
 
         if len(places) != 2:
             raise selection.BadFilter(f"--diff takes two places, recordings or runs; there are {len(self.place)}")
@@ -106,15 +106,15 @@ class View(EpisodeFlags):
         return side_by_side.side_by_side(first, second, episode_filter, self.runs)
 
     def _serve(self, files: Sequence[Path]) -> None:
-        from dextron_bench.browse.viewer_site import ViewerSite
-        from dextron_bench.leaderboard.local_server import LocalServer
         from dextron_bench.recording import web_viewer_files
+        from dextron_bench.web.local_server import LocalServer
+        from dextron_bench.web.viewer_site import ViewerSite
 
         with LocalServer(ViewerSite(files, web_viewer_files()), self.port) as server:
             serve(server)
 
     def _live(self) -> int:
-        from dextron_bench.runs.selection import BadFilter
+        from dextron_bench.catalogue.selection import BadFilter
 
         if self.web:
             raise BadFilter("--live shows its window on a screen; `run --tracker tensorboard` follows in the browser")
@@ -157,14 +157,14 @@ class View(EpisodeFlags):
         return DONE
 
     def _check_live(self) -> None:
-        from dextron_bench.runs.selection import BadFilter
+        from dextron_bench.catalogue.selection import BadFilter
 
         if len(self.method) != 1:
             raise BadFilter("--live takes the folder of a training, or one --method, such as rlil or exp")
 
     def _select(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
         """The recordings of selected episodes; prints a table of them unless --print is set."""
-        from dextron_bench.runs import rerecording, selection
+        from dextron_bench.catalogue import rerecording, selection
 
         table, matching = selection.select(selection.episodes(places), episode_filter)
         with progress_bar("recordings", self.quiet) as progress:
@@ -181,7 +181,7 @@ class View(EpisodeFlags):
 def _undamaged(files: Sequence[Path]) -> list[Path]:
     """The undamaged recordings; prints a line on stderr for each damaged one. Raises NoEpisodes if all are damaged."""
     from dextron_bench import recording
-    from dextron_bench.runs import selection
+    from dextron_bench.catalogue import selection
 
     summaries = list(recording.summarise(files, whole=True, hashes=selection.hashes(files)))
     damaged = [f"{summary.file}: {summary.damage}" for summary in summaries if summary.damage]

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli.exit_codes import DONE
-from dextron_bench.cli.output import print_table, progress_bar
-from dextron_bench.cli.success_eval import NoRows
+from dextron_bench.cli.success.evaluation import NoRows
+from dextron_bench.cli.support.exit_codes import DONE
+from dextron_bench.cli.support.output import print_table, progress_bar
 from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:

@@ -12,11 +12,11 @@ from dextron_bench.cluster.evaluations import ENTRANT
 from dextron_bench.cluster.inputs import imported_reaches
 from dextron_bench.cluster.ray_cluster import RayCluster
 from dextron_bench.cluster.tasks import RUNS, BadCluster, Task
-from dextron_bench.leaderboard.submission import playing
-from dextron_bench.leaderboard.submission.entry import Entry
 from dextron_bench.methods import specs
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.submissions import playing
+from dextron_bench.submissions.entry import Entry
 
 
 def play(

@@ -6,14 +6,14 @@ import shutil
 from pathlib import Path
 
 from dextron_bench.leaderboard import build, collect, highlights
-from dextron_bench.leaderboard.submission import bundle, names
-from dextron_bench.leaderboard.submission.entry import BadSubmission
-from dextron_bench.leaderboard.submission.verdict import Verdict
 from dextron_bench.methods import registry
 from dextron_bench.runs import run_files
 from dextron_bench.storage import atomic, folders, tables
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.submissions import bundle, names
+from dextron_bench.submissions.entry import BadSubmission
+from dextron_bench.submissions.verdict import Verdict
 
 
 def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:

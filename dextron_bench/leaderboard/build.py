@@ -11,13 +11,13 @@ import pandas as pd
 
 from dextron_bench.leaderboard import readme
 from dextron_bench.leaderboard.collect import RESULTS
-from dextron_bench.leaderboard.submission.bundle import AGENT
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
 from dextron_bench.storage import atomic, provenance, schemas
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.printable import spreadsheet_cell
 from dextron_bench.storage.run_folder import run_folders
+from dextron_bench.submissions.bundle import AGENT
 from dextron_bench.world import model
 
 ORIGIN = ("tier", "frames", "demonstrations", "seconds", "hardware", "privileged")

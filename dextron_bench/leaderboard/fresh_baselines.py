@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench.leaderboard.baseline_check import drawn_rows, play_rows
-from dextron_bench.leaderboard.fresh_settings import FreshSettings, from_frame, to_frame
-from dextron_bench.leaderboard.submission import replay_check
 from dextron_bench.reaches import sources
+from dextron_bench.splits.fresh_settings import FreshSettings, from_frame, to_frame
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic, schemas, tables
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.submissions import replay_check
 from dextron_bench.world import model
 
 FOLDER = "fresh"  # In the leaderboard's folder: the fresh settings of all baselines, a table for each source.

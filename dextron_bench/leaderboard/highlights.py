@@ -11,12 +11,12 @@ from urllib.parse import quote
 
 import pandas as pd
 
+from dextron_bench.catalogue import rerecording, selection
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.methods import registry
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import from_frame
 from dextron_bench.recording import Recording, read_safely, summarise
-from dextron_bench.runs import rerecording, selection
 from dextron_bench.splits.loading import Split, known_splits, load_split, ranking_splits
 from dextron_bench.storage import atomic
 from dextron_bench.storage.folders import visible

@@ -8,7 +8,9 @@ from pathlib import Path
 
 from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.leaderboard.highlights import FOLDER
-from dextron_bench.leaderboard.local_server import (
+from dextron_bench.leaderboard.page import FILE
+from dextron_bench.submissions.bundle import AGENT
+from dextron_bench.web.local_server import (
     LocalServer,
     Request,
     Response,
@@ -16,8 +18,6 @@ from dextron_bench.leaderboard.local_server import (
     viewer_file,
     viewer_link,
 )
-from dextron_bench.leaderboard.page import FILE
-from dextron_bench.leaderboard.submission.bundle import AGENT
 
 RECORDING = re.compile(rf"/{FOLDER}/([A-Za-z0-9][A-Za-z0-9._+-]*\.rrd)")
 LINK = re.compile(rf'href="\.\./{FOLDER}/([A-Za-z0-9._+%-]+\.rrd)"')

@@ -12,7 +12,6 @@ from typing import Any
 from dextron_bench.leaderboard import baseline_check, build, collect, fresh_baselines
 from dextron_bench.leaderboard.baseline_check import Finding
 from dextron_bench.leaderboard.highlights import FOLDER
-from dextron_bench.leaderboard.submission import bundle, episode_tables, replay_check
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.runs import result_files
@@ -21,6 +20,7 @@ from dextron_bench.storage import atomic, hashing, schemas
 from dextron_bench.storage.folders import copy_tree, visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder, seed_folders
+from dextron_bench.submissions import bundle, episode_tables, replay_check
 
 BUILT = (".md", ".csv", ".json", ".html")  # Files that are compared byte by byte; pictures are not.
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.processes import limited_process
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.recording import reader_process, rrd_format
 from dextron_bench.recording.episode_file import ENDS, BrokenRecording, Recording, Value, read
 from dextron_bench.recording.rrd_file import APPLICATION, APPLICATIONS
 from dextron_bench.recording.rrd_format import RrdFormat
-from dextron_bench.storage import limited_process
 
 NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Properties of every episode.
 PAIR = "pair"  # Property of a file with two episodes, which is only for the viewer.

@@ -16,7 +16,7 @@ from typing import IO
 
 from rerun.experimental import ViewerClient
 
-from dextron_bench.storage import programs
+from dextron_bench.processes import programs
 
 LOOPBACK = "127.0.0.1"
 HEADLESS = "--headless"  # A viewer without a window.

@@ -16,10 +16,10 @@ from typing import Any, Self
 
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case
+from dextron_bench.processes import programs
+from dextron_bench.processes.limited_process import SINGLE_THREADED
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import recording_files
-from dextron_bench.storage import programs
-from dextron_bench.storage.limited_process import SINGLE_THREADED
 
 EACH = 12  # Recordings for each process, at least: a process takes as long to start as to write them, some 2 s.
 AHEAD = 3  # Recordings for each process that are written or wait for it; with more, the rollout waits.

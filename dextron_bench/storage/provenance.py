@@ -13,7 +13,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.storage import hashing, programs
+from dextron_bench.processes import programs
+from dextron_bench.storage import hashing
 from dextron_bench.storage.folders import visible
 
 PACKAGES = ("dextron-bench", "mujoco", "dm-control", "numpy", "scipy", "pandas", "pyarrow", "torch", "rerun-sdk")

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from dextron_bench.storage import programs, schemas
+from dextron_bench.processes import programs
+from dextron_bench.storage import schemas
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.run_folder import TRACKING
 

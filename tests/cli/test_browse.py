@@ -10,7 +10,7 @@ import pytest
 
 from dextron_bench import recording
 from dextron_bench.cli import browse, main
-from dextron_bench.leaderboard.local_server import LocalServer
+from dextron_bench.web.local_server import LocalServer
 
 WORDS = ["--split", "test", "--quiet", "--json", "--record", "0"]
 

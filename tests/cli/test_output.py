@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from dextron_bench.cli import output
+from dextron_bench.cli.support import output
 
 
 class Terminal:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.cli import places
+from dextron_bench.cli.support import places
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from dextron_bench.cli import main, output
+from dextron_bench.cli import main
+from dextron_bench.cli.support import output
 from tests.helpers import tiny_benchmark
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.cli.usage import one_line
+from dextron_bench.cli.support.usage import one_line
 
 BOX = """╭─ Value error ────────╮
 │ Error parsing --rate: │

@@ -12,9 +12,9 @@ import rerun as rr
 
 from dextron_bench import recording
 from dextron_bench.cli import main
-from dextron_bench.leaderboard.local_server import LocalServer, Request
 from dextron_bench.storage import tables
 from dextron_bench.success import network
+from dextron_bench.web.local_server import LocalServer, Request
 from tests.helpers import fixed_success_model
 
 NOTHING = "runs/nothing/synthetic/seed0"
@@ -126,7 +126,7 @@ def test_damaged_recordings_are_listed_and_the_others_are_opened(
 def test_a_line_explains_how_to_select_all_matching_episodes(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
-    from dextron_bench.runs import selection
+    from dextron_bench.catalogue import selection
 
     monkeypatch.setattr(selection, "LIMIT", 1)
     assert main.main(["view", "--split", "test"]) == 0

@@ -27,7 +27,6 @@ MORE = {  # Words with which a command starts processes, or reads what lies in t
     ),
     "eval": (["--policies", "nosuch", "--quiet"],),
     "check": (["mine.py:Mine"],),
-    "rebuild": (["--list"],),
     "leaderboard": (["build"], ["serve", "--port", "0"]),
     "recordings": (["list", "one.rrd"], ["export", "one.rrd", "--into", "one.gif"]),
     "list": ([],),

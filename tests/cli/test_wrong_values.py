@@ -23,12 +23,13 @@ from urllib import request
 import pytest
 
 import dextron_bench
-from dextron_bench.cli import main, method_flags, usage
+from dextron_bench.catalogue import mlflow_export
+from dextron_bench.cli import main
 from dextron_bench.cli.commands import COMMANDS
-from dextron_bench.cli.exit_codes import BUG
+from dextron_bench.cli.support import method_flags, usage
+from dextron_bench.cli.support.exit_codes import BUG
 from dextron_bench.methods.isolation import sandbox
 from dextron_bench.recording import viewer
-from dextron_bench.runs import mlflow_export
 
 SECONDS = 0.5  # After which a command has accepted its words, and is ended.
 VALUES = (

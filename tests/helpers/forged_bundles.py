@@ -14,13 +14,13 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dextron_bench.leaderboard.submission import bundle, playing, verification
-from dextron_bench.leaderboard.submission import entry as submission_entry
-from dextron_bench.leaderboard.submission.verdict import Verdict
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.runs import result_files, run_files
 from dextron_bench.storage import hashing
 from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.submissions import bundle, playing, verification
+from dextron_bench.submissions import entry as submission_entry
+from dextron_bench.submissions.verdict import Verdict
 from tests.helpers import tiny_benchmark
 
 AGENT = """

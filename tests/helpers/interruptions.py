@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.cli.exit_codes import INTERRUPTED
+from dextron_bench.cli.support.exit_codes import INTERRUPTED
 from dextron_bench.storage import atomic
 
 EVERY = 10  # Files that are written between interruptions.

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.leaderboard import add, build, verify_board
-from dextron_bench.leaderboard.submission import entry
 from dextron_bench.recording import read_safely
+from dextron_bench.submissions import entry
 from dextron_bench.world import task
 from tests.helpers import tiny_benchmark
 from tests.helpers.forged_bundles import Forgery

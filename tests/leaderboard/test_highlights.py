@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from dextron_bench import recording
+from dextron_bench.catalogue import selection
 from dextron_bench.cli import main
 from dextron_bench.leaderboard import highlights
-from dextron_bench.runs import selection
 from dextron_bench.success import network
 from tests.helpers import fixed_success_model
 

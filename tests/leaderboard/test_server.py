@@ -18,7 +18,7 @@ from urllib.parse import unquote
 import pytest
 
 from dextron_bench.leaderboard import server as leaderboard_server
-from dextron_bench.leaderboard.local_server import LOOPBACK
+from dextron_bench.web.local_server import LOOPBACK
 
 PAGE = '<a href="../recordings/a%2Bb-success.rrd">success</a>'
 

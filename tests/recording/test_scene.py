@@ -12,9 +12,10 @@ from rerun.chunk import Chunk, RrdReader
 
 from dextron_bench import recording
 from dextron_bench.recording import scene, shapes
-from dextron_bench.world import hulls, model, task
+from dextron_bench.world import model, task
 from dextron_bench.world.rendering import visuals
 from tests.recording.test_episode_file import PATH, episode
+from tools import hulls
 
 
 def test_poses_contacts_and_signals_are_read_back(tmp_path: Path) -> None:

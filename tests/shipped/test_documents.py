@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.cli.rebuild import DOCUMENTS
-from dextron_bench.leaderboard import documents
+from tools import documents
+from tools.rebuild import DOCUMENTS
 
 ROOT = Path(__file__).parents[2]
 FENCE = re.compile(r"^```(?:python|py)\b[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)

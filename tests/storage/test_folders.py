@@ -22,8 +22,8 @@ MAY_LIST = {  # Modules that list folders themselves, and why hidden names do no
     "dextron_bench/training/checkpoints.py": "looks for temporary files",
     "dextron_bench/reaches/recorded/release.py": "every file of the release has a known SHA-256",
     "dextron_bench/methods/isolation/": "lists processes, what to hide, and what an agent wrote",
-    "dextron_bench/leaderboard/submission/recording_check.py": "every recording is compared with its episode",
-    "dextron_bench/leaderboard/submission/starter.py": "asks whether a folder is empty",
+    "dextron_bench/submissions/recording_check.py": "every recording is compared with its episode",
+    "dextron_bench/submissions/starter.py": "asks whether a folder is empty",
 }
 KILLED = """
 import errno, os, sys

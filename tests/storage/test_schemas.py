@@ -90,7 +90,7 @@ def test_every_json_file_of_a_run_is_read_through_a_schema():
         for file in sorted((ROOT / folder).rglob("*.py"))
         if any(isinstance(node, ast.Attribute) and node.attr == "read_json" for node in ast.walk(_tree(file)))
     ]
-    assert set(readers) <= {"dextron_bench/storage/schemas.py", "dextron_bench/leaderboard/submission/seed_check.py"}
+    assert set(readers) <= {"dextron_bench/storage/schemas.py", "dextron_bench/submissions/seed_check.py"}
 
 
 def _tree(file: Path) -> ast.AST:

@@ -14,12 +14,12 @@ import pandas as pd
 
 from dextron_bench.leaderboard import highlights
 from dextron_bench.leaderboard.page import sections, standings_table
-from dextron_bench.leaderboard.page.html import Html, join, tag
 from dextron_bench.leaderboard.page.rows import Entry, entries
 from dextron_bench.leaderboard.page.sections import Curves
 from dextron_bench.leaderboard.page.standings_table import Code
 from dextron_bench.splits.loading import SPLIT_NAMES
 from dextron_bench.splits.tracks import PLUS
+from dextron_bench.web.html import Html, join, style, tag
 from dextron_bench.world import model
 
 FILE = "index.html"
@@ -63,7 +63,7 @@ def document(
     }
     values = {
         "policy": _script_hash(script),
-        "style": _resource("page.css"),
+        "style": style(),
         "script": script,
         "facts": _facts(rows),
         "controls": _controls(table_entries),

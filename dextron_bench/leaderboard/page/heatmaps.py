@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench.leaderboard.page.html import UNKNOWN, Html, tag
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import EVALUATED, known_splits, load_split
+from dextron_bench.web.html import UNKNOWN, Html, tag
 from dextron_bench.world import task
 
 RINGS, ANGLES = range(4), range(4)

@@ -12,12 +12,12 @@ from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.leaderboard import highlights
 from dextron_bench.leaderboard.highlights import Shown
 from dextron_bench.leaderboard.page import heatmaps as page_heatmaps
-from dextron_bench.leaderboard.page import svg
 from dextron_bench.leaderboard.page import tracks as page_tracks
-from dextron_bench.leaderboard.page.html import UNKNOWN, Html, join, tag
 from dextron_bench.scores import cells
 from dextron_bench.splits.loading import EVALUATED
 from dextron_bench.success.exemplars import KINDS
+from dextron_bench.web import svg
+from dextron_bench.web.html import UNKNOWN, Html, join, tag
 
 Curves = Mapping[str, Mapping[str, Mapping[int, pd.DataFrame]]]  # By source of reaches, method and seed.
 

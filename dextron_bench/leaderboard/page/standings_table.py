@@ -8,10 +8,10 @@ from typing import Any
 from urllib.parse import quote
 
 from dextron_bench.leaderboard.highlights import Shown
-from dextron_bench.leaderboard.page import svg
-from dextron_bench.leaderboard.page.html import UNKNOWN, Html, join, tag
 from dextron_bench.leaderboard.page.rows import QUOTED, Entry
 from dextron_bench.scores import cells
+from dextron_bench.web import svg
+from dextron_bench.web.html import UNKNOWN, Html, join, tag
 
 Links = Mapping[str, Sequence[Shown]]
 Code = Mapping[tuple[str, str], Sequence[str]]  # Paths from the page, by method and source of reaches.

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from dextron_bench.leaderboard.page.html import UNKNOWN, Html, tag
 from dextron_bench.scores import robustness
 from dextron_bench.scores.robustness import Robustness
 from dextron_bench.splits.tracks import TRACKS
+from dextron_bench.web.html import UNKNOWN, Html, tag
 from dextron_bench.world import task
 
 

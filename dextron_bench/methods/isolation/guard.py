@@ -29,7 +29,7 @@ PUBLIC = {  # Modules of the benchmark that agents may import, and the modules t
 }
 WORKER = (
     *("dextron_bench.methods.isolation", "dextron_bench.methods.loading", "dextron_bench.methods.specs"),
-    "dextron_bench.storage.programs",
+    "dextron_bench.processes.programs",
 )
 WORKER_FILES = ("worker", "guard", "policy_files", "protocol", "sandbox")  # In WORKER's first package.
 NETWORK = ("socket.connect", "socket.bind", "socket.send", "socket.getaddrinfo", "socket.gethostby")

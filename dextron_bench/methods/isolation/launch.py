@@ -12,7 +12,7 @@ from dextron_bench.methods import loading, specs
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import guard, sandbox
 from dextron_bench.methods.specs import AgentSpec
-from dextron_bench.storage import programs
+from dextron_bench.processes import programs
 
 
 class NoSandbox(AgentError):

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-from dextron_bench.storage import programs
+from dextron_bench.processes import programs
 
 # Parts of /usr and /usr/local, and of Python's prefix: other folders there may hold a project with results and splits.
 PARTS = ("bin", "sbin", "lib", "lib32", "lib64", "libexec", "share")

@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from dextron_bench.leaderboard.page import tracks
-from dextron_bench.leaderboard.page.html import UNKNOWN
+from dextron_bench.web.html import UNKNOWN
 
 
 def result(method: str, seed: int, **scores: list[float]) -> dict[str, Any]:

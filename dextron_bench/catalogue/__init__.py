@@ -1,0 +1,1 @@
+"""What is in folders of runs: runs and episodes found, filtered, exported and browsed."""
