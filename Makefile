@@ -11,7 +11,8 @@ ARGS ?=
 TORCH ?= torch==2.13.0
 TORCH_INDEX ?= $(shell command -v nvidia-smi >/dev/null || echo https://download.pytorch.org/whl/cpu)
 
-INSTALL = $(VENV)/bin/python -m pip install -qq --disable-pip-version-check -c constraints.txt
+# Python compiles what it imports; to compile every file of every package takes a minute.
+INSTALL = $(VENV)/bin/python -m pip install -qq --disable-pip-version-check --no-compile -c constraints.txt
 TORCH_ALONE = $(INSTALL) --no-deps $(TORCH)
 DM_CONTROL = dm-control dm-env dm-tree lxml wrapt
 

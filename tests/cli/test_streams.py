@@ -19,7 +19,8 @@ from tests.helpers import tiny_benchmark
 ROOT = Path(__file__).parents[2]
 TABLES = """
 import sys
-from dextron_bench.cli import list, main, output
+from dextron_bench.cli import list, main
+from dextron_bench.cli.support import output
 def call(self):
     for _ in range(2):
         output.print_table("a table \\u2013 with a dash", ["a", "b"], [[1, "\\u00e9"]])

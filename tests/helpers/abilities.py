@@ -34,12 +34,9 @@ def can_draw() -> bool:
         return False
 
 
+NO_PICTURES = "no picture can be drawn here (Debian: apt-get install libegl1 libopengl0 libgl1-mesa-dri, or libosmesa6)"
 ABILITIES = (
-    Ability(
-        "cannot draw off screen",
-        can_draw,
-        "no picture can be drawn here (Debian: apt-get install libegl1 libopengl0 libgl1-mesa-dri, or libosmesa6)",
-    ),
+    Ability("cannot draw off screen", can_draw, NO_PICTURES),
     Ability("torch", lambda: find_spec("torch") is not None, "it learns, and PyTorch is missing: pip install torch"),
     Ability("dm_control", lambda: find_spec("dm_control") is not None, "dm_control is missing: make setup"),
 )

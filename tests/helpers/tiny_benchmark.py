@@ -71,9 +71,10 @@ def forget() -> None:
 
 
 def start(folder: Path, *arguments: str | Path, **environment: str) -> subprocess.Popen[str]:
-    """Starts the command line with the splits in a folder, in a new process."""
+    """Starts the command line with the splits in a folder, in a new process, with buffers as users have them."""
     command = [sys.executable, str(COMMAND), str(folder), *map(str, arguments)]
-    inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
+    left_out = ("DEXTRON_", "PYTHONUNBUFFERED")
+    inherited = {key: value for key, value in os.environ.items() if not key.startswith(left_out)}
     return subprocess.Popen(
         command, env={**inherited, **environment}, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

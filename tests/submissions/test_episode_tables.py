@@ -84,6 +84,7 @@ def test_a_table_that_takes_too_long_is_refused(forged: Forgery, monkeypatch: py
 def test_a_table_with_a_changed_footer_is_refused_or_equal(forged: Forgery):
     """The memory of the reader stays below its limit, whatever count the bytes state."""
     file = forged.seed / "episodes.parquet"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     content = file.read_bytes()
     length = int.from_bytes(content[-8:-4], "little")
     splits = [load_split(tiny_benchmark.NAME, name) for name in ranking_splits(tiny_benchmark.NAME)]
@@ -98,4 +99,4 @@ def test_a_table_with_a_changed_footer_is_refused_or_equal(forged: Forgery):
         except BadBundle:
             refused += 1
     assert refused >= 6
-    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 1_500_000  # [kB]
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss <= max(before, 1_500_000)  # [kB]

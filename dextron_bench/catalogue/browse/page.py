@@ -45,8 +45,8 @@ def document(episodes: pd.DataFrame, search: Search, token: str, target: str, no
 
 def _style() -> Html:
     """The style of all pages, and what this page adds."""
-    own = files("dextron_bench.catalogue.browse") / "page.css"
-    return Html(style() + own.read_text(encoding="utf-8"))
+    added = files("dextron_bench.catalogue.browse") / "page.css"
+    return Html(style() + added.read_text(encoding="utf-8"))
 
 
 def _facts(episodes: pd.DataFrame) -> Html:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import io
 import os
 import sys
@@ -68,6 +69,7 @@ def only_json(words: Sequence[str]) -> Iterator[None]:
     finally:
         _json.pop()
         sys.stdout = before
+        ctypes.CDLL(None).fflush(None)  # What C's library holds back would follow the JSON at the end of the process.
         os.dup2(saved, 1)
         with suppress(OSError):  # Of a reader that has left, which the block has raised.
             copy.close()

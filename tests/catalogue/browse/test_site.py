@@ -68,7 +68,7 @@ def test_an_expression_that_cannot_be_read_is_explained_on_the_page(ask: Ask):
 
 def test_a_picture_shows_the_last_state(ask: Ask, episodes: pd.DataFrame):
     answer, body = ask(f"/picture/{key_of(episodes, 'exp')}.png")
-    assert answer.headers["Content-Type"] == "image/png"
+    assert answer.headers["Content-Type"] == "image/png", ask("/")[1].decode()
     picture = Image.open(io.BytesIO(body)).convert("RGB")
     assert picture.size == (320, 240)
     assert len(set(picture.getdata())) > 50  # pyright: ignore[reportArgumentType]

@@ -69,7 +69,8 @@ def printed(code: str, **environment: str) -> str:
     """What a new interpreter prints for some code, which must end well and complain of nothing."""
     words = [sys.executable, "-c", START + code]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120, env={**os.environ, **environment})
-    assert (done.returncode, done.stderr) == (0, "")
+    assert not done.stderr, done.stderr
+    assert done.returncode == 0
     return done.stdout.strip()
 
 
