@@ -27,6 +27,7 @@ from typing import Any, get_args
 
 import pandas as pd
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.experts import database
 from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.reaches.sources import RankedSource
@@ -73,7 +74,7 @@ def _values(board: Path) -> Callable[[str], str]:
     """The text of each key."""
 
     @cache
-    def results() -> list[dict[str, Any]]:
+    def results() -> list[Result]:
         return list(result_files.results(board / RESULTS))
 
     @cache
@@ -120,12 +121,12 @@ def _of_row(rows: pd.DataFrame, method: str, reaches: str, split: str, name: str
     return f"{100 * share:.1f}"
 
 
-def _of_seeds(results: Iterable[Mapping[str, Any]], method: str, reaches: str, split: str) -> str:
+def _of_seeds(results: Iterable[Result], method: str, reaches: str, split: str) -> str:
     """The success rates of the seeds of a method on a split [%], in the order of the seeds."""
     seeds = {
-        result["seed"]: result["splits"][split]["causes"].get("solved", 0) / len(result["splits"][split]["scores"])
+        result.seed: result.splits[split].causes.get("solved", 0) / len(result.splits[split].scores)
         for result in results
-        if (result["method"], result["reaches"]) == (method, reaches) and split in result["splits"]
+        if (result.method, result.reaches) == (method, reaches) and split in result.splits
     }
     if not seeds:
         raise KeyError("the leaderboard has no such row")

@@ -101,13 +101,14 @@ def _chosen(names: Iterable[str]) -> list[Step]:
 
 def _state(step: Step) -> str:
     """`fresh`, `stale`, or `missing` if the step was never done here."""
-    from dextron_bench.storage import schemas
+    from dextron_bench.storage import records
 
     if not _entry_file(step).exists():
         return "missing"
     return (
         "fresh"
-        if schemas.read(_entry_file(step), schemas.STEP) == {"inputs": _inputs(step), "outputs": _outputs(step)}
+        if records.read(_entry_file(step), dict[str, str | dict[str, str]])
+        == {"inputs": _inputs(step), "outputs": _outputs(step)}
         else "stale"
     )
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
+from msgspec import to_builtins
+
 from dextron_bench.catalogue.run_catalogue import Entry
 from dextron_bench.runs import annotations, playing, result_files
 from dextron_bench.storage import run_times
@@ -58,7 +60,7 @@ def _exported(entry: Entry, seed: int) -> ExportedRun:
     """A seed of an entry; raises DamagedFile, OSError."""
     run = RunFolder.of_seed(entry.folder, seed)
     about = {"method": entry.label, "reaches": entry.reaches, "seed": seed, "physics": entry.physics}
-    code = {f"code.{name}": value for name, value in entry.code.items() if value}
+    code = {f"code.{name}": value for name, value in to_builtins(entry.code or {}).items() if value}
     params = {name: str(value) for name, value in {**about, **code, **entry.settings}.items()}
     metrics = [*_scores(run), *_curve(entry, seed), *_training(entry, seed)]
     tags = dict.fromkeys(entry.tags, "true")
@@ -81,22 +83,22 @@ def _state(run: RunFolder, failure: str) -> str:
 
 def _scores(run: RunFolder) -> Iterator[Metric]:
     """Mean return and success rate of a seed on each split."""
-    splits = result_files.read_result(run.result)["splits"] if run.result.exists() else {}
-    for split, content in splits.items():
-        scores = content["scores"]
+    splits = result_files.read_result(run.result).splits if run.result.exists() else {}
+    for split, played in splits.items():
+        scores = played.scores
         yield Metric(f"{split}.return", sum(scores) / len(scores))
         yield Metric(f"{split}.success", sum(score == task.SUCCESS for score in scores) / len(scores))
 
 
 def _curve(entry: Entry, seed: int) -> Iterator[Metric]:
     for point in entry.curves.get(seed, ()):
-        for name in ("return", "success"):
-            yield Metric(f"val_curve.{name}", float(point[name]), int(point["epoch"]))
+        yield Metric("val_curve.return", point.mean, point.epoch)
+        yield Metric("val_curve.success", point.success, point.epoch)
 
 
 def _training(entry: Entry, seed: int) -> Iterator[Metric]:
     """The metrics of a seed's training, as far as it is; raises DamagedFile."""
     folders = [folder for folder, seeds in loop.training_folders(entry.folder).items() if seed in seeds]
-    for row in (row for folder in folders for row in metric_rows.read(folder) if row["seed"] == seed):
-        for name in sorted(row.keys() - {"epoch", "seed"}):
-            yield Metric(f"train.{name}", float(row[name]), int(row["epoch"]))
+    for row in (row for folder in folders for row in metric_rows.read(folder) if row.seed == seed):
+        for name in sorted(row.metrics):
+            yield Metric(f"train.{name}", row.metrics[name], row.epoch)

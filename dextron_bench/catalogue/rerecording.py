@@ -13,11 +13,12 @@ from dextron_bench import recording
 from dextron_bench.catalogue import selection
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
+from dextron_bench.evaluation.results import RunConfig
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import from_frame
 from dextron_bench.runs import recording_files, result_files
 from dextron_bench.splits.loading import load_split
-from dextron_bench.storage import provenance, schemas
+from dextron_bench.storage import records
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.world import model
@@ -82,8 +83,8 @@ def _check_playable(row: dict[Any, Any], fault: str) -> None:
 def _physics(run: RunFolder) -> str:
     """The hash of the physics of a run; on a leaderboard, the result has it."""
     if run.config.exists():
-        return str(schemas.read(run.config, schemas.CONFIG).get("physics"))
-    return provenance.physics_of(result_files.read_result(run.result))
+        return records.read(run.config, RunConfig).physics
+    return result_files.read_result(run.result).physics
 
 
 def _record(group: pd.DataFrame) -> Iterator[None]:

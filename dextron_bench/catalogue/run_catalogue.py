@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.evaluation.results import Code, Result, RunConfig
 from dextron_bench.runs import annotations, playing, result_files
-from dextron_bench.storage import run_times, schemas
+from dextron_bench.storage import records, run_times
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.storage.run_times import RunTimes
-from dextron_bench.training import jobs
+from dextron_bench.training import jobs, learning_curve
+from dextron_bench.training.learning_curve import CurvePoint
 from dextron_bench.world import task
 
 DONE, UNFINISHED = "done", "unfinished"
@@ -31,7 +33,7 @@ class Entry:
     """All seeds of a method with its settings on one source of reaches.
 
     `scores` holds, by split, the scores (seeds, rows) of the seeds that have played it. `curves` holds, by seed, the
-    learning curve: points with `epoch`, and `return` and `success` on `val`. `state` says in words how far it is, and
+    points of its learning curve. `state` says in words how far it is, and
     `times` when each seed began and ended.
     """
 
@@ -40,12 +42,12 @@ class Entry:
     folder: Path
     seeds: tuple[int, ...]
     settings: Mapping[str, Any]
-    code: Mapping[str, Any]
+    code: Code | None
     physics: str
     state: str
     times: Mapping[int, RunTimes]
     scores: Mapping[str, np.ndarray] = field(default_factory=dict)
-    curves: Mapping[int, Sequence[Mapping[str, float]]] = field(default_factory=dict)
+    curves: Mapping[int, Sequence[CurvePoint]] = field(default_factory=dict)
     tags: tuple[str, ...] = ()
     note: str = ""
 
@@ -69,8 +71,8 @@ class Entry:
             values = self.scores[split] if what == "return" else self.scores[split] == task.SUCCESS
             return float(values.mean())
         if split == VAL and self.curves:
-            best = [max(points, key=lambda point: point["return"]) for points in self.curves.values()]
-            return float(np.mean([point[what] for point in best]))
+            best = [max(points, key=lambda point: point.mean) for points in self.curves.values()]
+            return float(np.mean([point.mean if what == "return" else point.success for point in best]))
         return float("nan")
 
 
@@ -99,7 +101,7 @@ def _entry(
     folder: Path, members: Sequence[RunFolder], left: Mapping[tuple[str, str], jobs.UnfinishedTraining]
 ) -> Entry:
     label, reaches = folder.parts[-2:]
-    config = schemas.read(members[0].config, schemas.CONFIG)
+    config = records.read(members[0].config, RunConfig)
     results = [result_files.read_result(run.result) for run in members if run.result.exists()]
     notes = annotations.read(folder)
     return Entry(
@@ -107,13 +109,13 @@ def _entry(
         reaches,
         folder,
         tuple(run.seed for run in members),
-        {**config.get("defaults", {}), **config.get("settings", {})},
-        config.get("code", {}),
-        config.get("physics", ""),
+        {**config.defaults, **(config.settings or {})},
+        config.code,
+        config.physics,
         _state(members, left.get((label, reaches))),
         {run.seed: run_times.read(run) for run in members},
         _scores(results),
-        {run.seed: schemas.read(run.curve, schemas.CURVE)["points"] for run in members if run.curve.exists()},
+        {run.seed: learning_curve.read(run.curve) for run in members if run.curve.exists()},
         notes.tags,
         notes.note,
     )
@@ -132,11 +134,11 @@ def _state(members: Sequence[RunFolder], training: jobs.UnfinishedTraining | Non
     return DONE if all(run.result.exists() for run in members) else UNFINISHED
 
 
-def _scores(results: Iterable[Mapping[str, Any]]) -> dict[str, np.ndarray]:
+def _scores(results: Iterable[Result]) -> dict[str, np.ndarray]:
     """The scores (seeds, rows) of each split, of the seeds whose rows are as many as the first seed's."""
     by_split: dict[str, list[list[float]]] = defaultdict(list)
     for result in results:
-        for split, scores in result["splits"].items():
-            if not by_split[split] or len(by_split[split][0]) == len(scores["scores"]):
-                by_split[split].append(scores["scores"])
+        for split, scores in result.splits.items():
+            if not by_split[split] or len(by_split[split][0]) == len(scores.scores):
+                by_split[split].append(scores.scores)
     return {split: np.array(rows, float) for split, rows in by_split.items()}

@@ -10,8 +10,9 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.evaluation.results import RunConfig
 from dextron_bench.runs import recording_files, result_files, run_files
-from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage import atomic, records
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import TRACKING, RunFolder, below
 
@@ -91,13 +92,12 @@ def episodes(places: Sequence[Path]) -> pd.DataFrame:
 def run_identity(run: RunFolder) -> dict[str, Any]:
     """Method, source of reaches and seed of a run, as its recordings have them; raises DamagedFile."""
     if run.result.exists():
-        content = result_files.read_result(run.result)
-    else:  # The run is not finished; its path has the label.
-        content = schemas.read(run.config, schemas.CONFIG) | {"method": run.label}
-    try:
-        return {name: content[name] for name in ("method", "reaches", "seed")}
-    except KeyError as error:
-        raise atomic.OtherForm(run.config, f"it lacks {error}") from error
+        result = result_files.read_result(run.result)
+        return {"method": result.method, "reaches": result.reaches, "seed": result.seed}
+    config = records.read(run.config, RunConfig)
+    if not config.reaches or config.seed is None:
+        raise atomic.OtherForm(run.config, f"it lacks {'seed' if config.reaches else 'reaches'!r}")
+    return {"method": run.label, "reaches": config.reaches, "seed": config.seed}  # It is not finished.
 
 
 def select(table: pd.DataFrame, episode_filter: EpisodeFilter) -> tuple[pd.DataFrame, int]:

@@ -37,7 +37,7 @@ class Doctor:
 
 PACKAGES = (
     *("mujoco", "dm-control", "gymnasium", "numpy", "scipy", "torch", "safetensors"),
-    *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "pillow", "tyro", "rich", "jsonschema", "threadpoolctl"),
+    *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "pillow", "tyro", "rich", "msgspec", "threadpoolctl"),
 )
 EXTRAS = {  # By package: the extra that installs it.
     **{"minari": "minari", "av": "video", "onnxruntime": "onnx", "optuna": "sweep", "mlflow-skinny": "mlflow"},

@@ -30,7 +30,7 @@ class List:
         rows = [(split.reaches, split.name, len(split), split.digest[:8]) for split in splits]
         print_table("methods", ["name", "description"], methods)
         print_table("splits", ["reaches", "split", "rows", "version"], rows)
-        done = [(r["method"], r["reaches"], r["seed"], ", ".join(r["splits"])) for r in result_files.results(self.runs)]
+        done = [(r.method, r.reaches, r.seed, ", ".join(r.splits)) for r in result_files.results(self.runs)]
         trainings = [(t.label, t.reaches, " ".join(map(str, t.seeds)), t.left) for t in jobs.unfinished(self.runs)]
         if trainings:
             print_table(f"trainings in {self.runs}", ["method", "reaches", "seeds", "left"], trainings)

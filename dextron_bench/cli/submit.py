@@ -12,8 +12,8 @@ from dextron_bench.cli.leaderboard.show import print_rows
 from dextron_bench.cli.support import clusters, shares
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.output import progress_bar
+from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.reaches.sources import RankedSource
-from dextron_bench.submissions.declaration import Declaration
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -136,7 +136,7 @@ class Submit:
         results += [
             result
             for result in result_files.results(published if published.exists() else result_files.published_results())
-            if result["method"] != self.name and result["reaches"] == self.reaches
+            if result.method != self.name and result.reaches == self.reaches
         ]
         rows = standings.table(results)
         return rows[rows["split"].isin(ranking_splits(self.reaches))]

@@ -137,16 +137,18 @@ class Sweep:
 
     def _print(self, file: SweepFile) -> int:
         """Prints a sweep; the exit code says whether the agent raised errors."""
+        from msgspec import to_builtins
+
         from dextron_bench.cli import sweep_output
         from dextron_bench.sweeps.trial import FAILED, Trial
 
         content = file.read()
-        trials = [Trial.from_json(trial) for trial in content["trials"]]
+        trials = [Trial.of(trial) for trial in content.trials]
         if self.into is not None:
-            self._check_picture(content["question"]["space"])
+            self._check_picture(content.question["space"])
             sweep_output.draw(content, trials, self.into)
         if self.json:
-            print_json(content)
+            print_json(to_builtins(content))
         else:
             sweep_output.print_trials(file, content, trials, self.runs)
             sweep_output.print_winner(content, trials, self.runs)
@@ -167,15 +169,15 @@ class Sweep:
     def _show_all(self) -> int:
         """Prints a row for each sweep."""
         from dextron_bench.sweeps.sweep import sweep_files
-        from dextron_bench.sweeps.trial import ENDED
+        from dextron_bench.sweeps.trial import ENDED, Trial
 
         rows = []
         for file in sweep_files(self.runs):
             content = file.read()
-            winner = content["winner"]
-            score = content["trials"][winner["trial"]]["val"]["return"]["mean"] if winner else None
-            ended = sum(trial["state"] in ENDED for trial in content["trials"])
-            rows.append([file.name, content["question"]["method"], ended, winner["run"] if winner else "", score])
+            winner = content.winner
+            score = Trial.of(content.trials[winner.trial]).score if winner else None
+            ended = sum(trial.state in ENDED for trial in content.trials)
+            rows.append([file.name, content.question["method"], ended, winner.run if winner else "", score])
         if self.json:
             names = ("sweep", "method", "ended", "winner", "return")
             print_json([dict(zip(names, row, strict=True)) for row in rows])

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dextron_bench.cli.support.output import print_table
 
 if TYPE_CHECKING:
-    from dextron_bench.sweeps.sweep import SweepFile
+    from dextron_bench.sweeps.sweep import SweepContent, SweepFile
     from dextron_bench.sweeps.trial import Trial
 
 
@@ -20,9 +19,9 @@ def in_words(trial: Trial) -> str:
     return f"{settings}: {outcome}"
 
 
-def print_trials(file: SweepFile, content: Mapping[str, Any], trials: list[Trial], runs: Path) -> None:
+def print_trials(file: SweepFile, content: SweepContent, trials: list[Trial], runs: Path) -> None:
     """Prints the table of trials, the best first."""
-    names = list(content["question"]["space"])
+    names = list(content.question["space"])
     ranked = sorted(trials, key=lambda trial: -trial.score if trial.returns else 1.0)
     rows = [
         [
@@ -31,33 +30,33 @@ def print_trials(file: SweepFile, content: Mapping[str, Any], trials: list[Trial
         ]
         for trial in ranked
     ]
-    seeds = " ".join(map(str, content["question"]["seeds"]))
+    seeds = " ".join(map(str, content.question["seeds"]))
     columns = [*names, "run", "return on val [95 %]", "success %", "state"]
     print_table(f"{file.path}, seeds {seeds}", columns, rows)
 
 
-def print_winner(content: Mapping[str, Any], trials: list[Trial], runs: Path) -> None:
+def print_winner(content: SweepContent, trials: list[Trial], runs: Path) -> None:
     """Prints the winner, how it was chosen, and the command that plays it on the splits that rank."""
     from dextron_bench.methods import registry
     from dextron_bench.sweeps.trial import STARTED
 
-    if content["winner"] is None:
+    if content.winner is None:
         print("no trial is done, so there is no winner")
         return
-    winner, question = trials[content["winner"]["trial"]], content["question"]
-    words = [content["flags"], *(registry.as_flag(name, value) for name, value in winner.settings.items())]
+    winner, question = trials[content.winner.trial], content.question
+    words = [content.flags, *(registry.as_flag(name, value) for name, value in winner.settings.items())]
     words += ["--reaches", question["reaches"], "--seed", *map(str, question["seeds"])]
     words += [] if runs == Path("runs") else ["--runs", str(runs)]
     title = "best so far" if any(trial.state == STARTED for trial in trials) else "winner"
-    print(f"{title}: {winner.run}, with {in_words(winner)}\n{content['choice']}")
+    print(f"{title}: {winner.run}, with {in_words(winner)}\n{content.choice}")
     print(f"On the splits that rank: dextron-bench run {' '.join(words)}")
 
 
-def draw(content: Mapping[str, Any], trials: list[Trial], file: Path) -> None:
+def draw(content: SweepContent, trials: list[Trial], file: Path) -> None:
     """Draws the scores of the trials that are done against the only setting that varies; raises OSError."""
     from dextron_bench.scores.figures import sweeps
 
-    question, (setting,) = content["question"], content["question"]["space"]
+    question, (setting,) = content.question, content.question["space"]
     points = [
         sweeps.Point(float(trial.settings[setting]), trial.returns, trial.successes)
         for trial in trials

@@ -35,7 +35,7 @@ def check(
 
 
 def _task(pieces: FindingPieces, row: Row, runs: Path, threads: int) -> Task:
-    reaches, board = row.result["reaches"], pieces.board
+    reaches, board = row.result.reaches, pieces.board
     files = [file for file in visible(row.run.path.parent, "**/*") if file.suffix not in NOT_NEEDED]
     files += visible(board / fresh_baselines.FOLDER, f"{reaches}.*")
     inputs = {f"{RUNS}/{BOARD}/{file.relative_to(board).as_posix()}": file for file in files if file.is_file()}

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec import to_builtins
 
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
@@ -120,7 +121,7 @@ class Export:
             "dextron_bench": {
                 "split": {"reaches": split.reaches, "name": split.name, "digest": split.digest, "rows": self.rows},
                 "players": [{"name": player.name, **player.about} for player in self.players],
-                "provenance": provenance.collect(model.mjcf_hash()),
+                "provenance": to_builtins(provenance.collect(model.mjcf_hash())),
             },
         }
 

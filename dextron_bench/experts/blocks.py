@@ -10,8 +10,9 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench.storage import atomic, folder_config, hashing, provenance, schemas, shares, tables
+from dextron_bench.storage import atomic, folder_config, hashing, provenance, records, shares, tables
 from dextron_bench.storage.folders import visible
+from dextron_bench.storage.provenance import Provenance
 from dextron_bench.world import model, task
 
 SEARCH = "search.json"  # The search that the folder belongs to.
@@ -48,12 +49,6 @@ def write_or_check(search: dict[str, Any], folder: Path) -> None:
     """Writes the search into a new folder; raises FolderMismatch if the folder holds another search."""
     config = {"search": search, "physics": model.mjcf_hash()}
     folder_config.write_or_check_file(folder / SEARCH, config, "search", "choose another folder, or remove it")
-
-
-def read_config(folder: Path) -> dict[str, Any]:
-    """The search that a folder holds, and the hash of its physics; empty if it holds none."""
-    file = folder / SEARCH
-    return schemas.read(file, schemas.SEARCH) if file.exists() else {}
 
 
 def write(folder: Path, number: int, draws: pd.DataFrame) -> None:
@@ -100,7 +95,7 @@ def take_pieces(search: dict[str, Any], folder: Path) -> None:
     work(folder).remove(pieces.values())
 
 
-def add_makers(folder: Path, makers: list[dict[str, Any]]) -> None:
+def add_makers(folder: Path, makers: list[Provenance]) -> None:
     """Adds to the provenance of a search. Blocks that were there before count as made by this process."""
     file = folder / PROVENANCE
     if file.exists() or update_tallies(folder, {}):
@@ -108,10 +103,10 @@ def add_makers(folder: Path, makers: list[dict[str, Any]]) -> None:
     atomic.write_json(file, provenance.merged(makers))
 
 
-def read_makers(folder: Path) -> dict[str, Any]:
+def read_makers(folder: Path) -> Provenance:
     """The provenance of a search: this process, if no shares have worked on it. Raises DamagedFile."""
     file = folder / PROVENANCE
-    return schemas.read(file, schemas.PROVENANCE) if file.exists() else provenance.collect(model.mjcf_hash())
+    return records.read(file, Provenance) if file.exists() else provenance.collect(model.mjcf_hash())
 
 
 def block_file(folder: Path, number: int) -> Path:

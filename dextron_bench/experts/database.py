@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from msgspec import to_builtins
 
 from dextron_bench.experts import blocks, montecarlo
 from dextron_bench.reaches import setting
-from dextron_bench.storage import atomic, hashing, provenance
+from dextron_bench.storage import atomic, hashing
 from dextron_bench.world import model, task
 
 BANDS = 9  # Equal bands of d_c in the statistics.
@@ -43,7 +44,7 @@ def save(
         "kept": len(kept),
         "solved": int((kept["score"] == task.SUCCESS).sum()),
         "statistics": statistics(draws, source).to_dict("records"),
-        "provenance": blocks.read_makers(folder),
+        "provenance": to_builtins(blocks.read_makers(folder)),
     }
     atomic.write_json(file.with_suffix(".json"), about)
     return file, about
@@ -77,7 +78,7 @@ def summary(file: Path) -> dict[str, Any]:
 
 def check_physics(summary: dict[str, Any]) -> None:
     """Raises OtherPhysics if the search of a summary was played with other physics than this version's."""
-    physics = provenance.physics_of(summary)
+    physics = summary.get("provenance", {}).get("physics", "")
     if physics != model.mjcf_hash():
         raise OtherPhysics(
             f"the database was searched with physics {physics[:8] or 'unknown'}, and this version has "

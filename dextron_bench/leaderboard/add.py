@@ -5,6 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from msgspec import structs
+
 from dextron_bench.leaderboard import build, collect, highlights
 from dextron_bench.methods import registry
 from dextron_bench.runs import run_files
@@ -43,7 +45,7 @@ def merge(verdict: Verdict, board: Path, agent: Path) -> list[Path]:
         manifest, place = verdict.manifest, _put(verdict, part)
         if agent.is_dir():
             folders.copy_tree(agent, place / bundle.AGENT)
-        highlights.record_outcomes(place, manifest["name"], manifest["reaches"], part.parent / highlights.FOLDER)
+        highlights.record_outcomes(place, manifest.name, manifest.reaches, part.parent / highlights.FOLDER)
         built = [board / file.relative_to(part) for file in build.build(part)]
     return built
 
@@ -51,7 +53,7 @@ def merge(verdict: Verdict, board: Path, agent: Path) -> list[Path]:
 def _put(verdict: Verdict, board: Path) -> Path:
     """Writes results, tables and manifest of a submission into a board that nobody reads yet; returns their folder."""
     manifest = verdict.manifest
-    place = board / collect.RESULTS / manifest["name"] / manifest["reaches"]
+    place = board / collect.RESULTS / manifest.name / manifest.reaches
     shutil.rmtree(place, ignore_errors=True)
     for seed, result in verdict.results.items():
         run = RunFolder.of_seed(place, seed)
@@ -59,6 +61,6 @@ def _put(verdict: Verdict, board: Path) -> Path:
         run_files.store_episodes(run, verdict.tables[seed])
         if seed in verdict.fresh:
             tables.write(run.fresh, verdict.fresh[seed])
-        atomic.write_json(run.result, {**result, "tier": verdict.tier})
+        atomic.write_json(run.result, structs.replace(result, tier=verdict.tier))
     atomic.write_json(place / bundle.MANIFEST, manifest)
     return place

@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard import readme
 from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
-from dextron_bench.storage import atomic, provenance, schemas
+from dextron_bench.storage import atomic
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.printable import spreadsheet_cell
 from dextron_bench.storage.run_folder import run_folders
 from dextron_bench.submissions.bundle import AGENT
+from dextron_bench.training import learning_curve
 from dextron_bench.world import model
 
 ORIGIN = ("tier", "frames", "demonstrations", "seconds", "hardware", "privileged")
@@ -56,20 +57,20 @@ def build(board: Path) -> list[Path]:
     return files
 
 
-def _results_of_this_world(runs: Path) -> list[dict[str, Any]]:
+def _results_of_this_world(runs: Path) -> list[Result]:
     """The results below a folder; raises OtherPhysics if one was played with other physics than this version's."""
     results = list(result_files.results(runs))
     for result in results:
-        if (physics := provenance.physics_of(result)) != model.mjcf_hash():
+        if result.physics != model.mjcf_hash():
             raise OtherPhysics(
-                f"{result['method']} on {result['reaches']} reaches, seed {result['seed']}, was played with physics "
-                f"{physics[:8] or 'unknown'}, and this version has {model.mjcf_hash()[:8]}; remove it from {runs}, "
-                "and run it again"
+                f"{result.method} on {result.reaches} reaches, seed {result.seed}, was played with physics "
+                f"{result.physics[:8] or 'unknown'}, and this version has {model.mjcf_hash()[:8]}; remove it from "
+                f"{runs}, and run it again"
             )
     return results
 
 
-def _with_origin(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> pd.DataFrame:
+def _with_origin(rows: pd.DataFrame, results: Iterable[Result]) -> pd.DataFrame:
     """The leaderboard's rows with the columns ORIGIN: how far each row was checked, and what its training took."""
     from dextron_bench.leaderboard.page.rows import QUOTED, entries
 
@@ -103,7 +104,7 @@ def learning_curves(runs: Path, cloned: bool = False) -> dict[tuple[str, str], C
         if not run.curve.exists():
             continue
         result = result_files.read_result(run.result)
-        points = pd.DataFrame(schemas.read(run.curve, schemas.CURVE)["points"])
-        if ((result.get("training") or {}).get("frames") is None) == cloned:
-            curves[result["method"], result["reaches"]][result["seed"]] = points
+        points = learning_curve.frame(learning_curve.read(run.curve))
+        if (result.training is not None and result.training.is_in_the_world) != cloned:
+            curves[result.method, result.reaches][result.seed] = points
     return curves

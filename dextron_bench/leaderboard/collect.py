@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Any
 
+from msgspec.structs import replace
+
+from dextron_bench.evaluation.results import Result, RunConfig, SplitScores
 from dextron_bench.methods import registry, specs, weights
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.learners import Learner
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.splits.tracks import PLUS
-from dextron_bench.storage import atomic, hashing, provenance, schemas
+from dextron_bench.storage import atomic, hashing, records
 from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.training import learning_curve
 from dextron_bench.world import model
 
-STAMPED = ("tier", "fresh")  # What verifications add to a result. Splits under tracks can be added, too.
 RESULTS = "results"  # In the leaderboard's folder: a folder of runs without their large files.
 
 
@@ -39,23 +40,23 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
         if only and run.path.relative_to(runs).parent.as_posix() not in only:
             continue
         result = result_files.read_result(run.result)
-        if provenance.physics_of(result) != model.mjcf_hash() or not _is_complete(result):
+        if result.physics != model.mjcf_hash() or not _is_complete(result):
             continue
         learner = _installed_learner(run, result)
-        if result.get("training"):  # Its snapshot was chosen on `val`, whose score would flatter it.
-            result = {**result, "splits": {name: split for name, split in result["splits"].items() if name != "val"}}
+        if result.training:  # Its snapshot was chosen on `val`, whose score would flatter it.
+            result = _with_splits(result, lambda name: name != "val")
         if run.curve.exists():
-            schemas.read(run.curve, schemas.CURVE)  # What is damaged is not copied.
+            learning_curve.read(run.curve)  # What is damaged is not copied.
         copy = RunFolder(board / RESULTS / run.path.relative_to(runs))
-        before = result_files.read_result(copy.result) if copy.result.exists() else {}
+        before = result_files.read_result(copy.result) if copy.result.exists() else None
         atomic.write_json(copy.result, _with_tier(result, before))
         if run.curve.exists():
             _copy(run.curve, copy.curve)
         if learner is not None:
-            if hashing.sha256(run.weights) != (result.get("training") or {}).get("sha256"):
+            if hashing.sha256(run.weights) != _weights(result):
                 raise atomic.OtherForm(run.weights, "it is not the file that the result names")
-            file = f"seed{result['seed']}.safetensors"
-            _copy(run.weights, weights.shipped_folder(learner, result["reaches"]) / file)
+            file = f"seed{result.seed}.safetensors"
+            _copy(run.weights, weights.shipped_folder(learner, result.reaches) / file)
         taken.append(copy.path)
     if not taken:
         raise NothingToPublish(
@@ -68,54 +69,65 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
 def run_digest(file: Path) -> str:
     """The hash of a published result without what is added later: tier, fresh scores, actions, splits under tracks."""
     result = result_files.read_result(file)
-    plain = {name: split for name, split in result["splits"].items() if PLUS not in name}
-    splits = {name: {key: split[key] for key in split if key != "actions"} for name, split in plain.items()}
-    kept = {key: result[key] for key in result if key not in STAMPED}
-    return hashing.digest(json.dumps({**kept, "splits": splits}, sort_keys=True).encode())
+    splits = {name: replace(split, actions=None) for name, split in _plain(result).items()}
+    return hashing.digest(atomic.json_text(replace(result, splits=splits, tier="", fresh=None)).encode())
 
 
-def _is_complete(result: dict[str, Any]) -> bool:
+def _with_splits(result: Result, keep: Callable[[str], bool]) -> Result:
+    """A result with the splits whose names pass."""
+    return replace(result, splits={name: split for name, split in result.splits.items() if keep(name)})
+
+
+def _plain(result: Result) -> dict[str, SplitScores]:
+    """The splits that were not played under a track."""
+    return _with_splits(result, lambda name: PLUS not in name).splits
+
+
+def _is_complete(result: Result) -> bool:
     """True if a result holds all rows of all splits that rank methods, in their present versions."""
-    splits = [load_split(result["reaches"], name) for name in ranking_splits(result["reaches"])]
-    scored = {name: (split["digest"], len(split["scores"])) for name, split in result["splits"].items()}
+    splits = [load_split(result.reaches, name) for name in ranking_splits(result.reaches)]
+    scored = {name: (split.digest, len(split.scores)) for name, split in result.splits.items()}
     return all(scored.get(split.name) == (split.digest, len(split)) for split in splits)
 
 
-def _with_tier(result: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
-    """A result with what was added to the one that it replaces, if both have the same plain scores."""
-    if not before or _scores(result) != _scores(before):
+def _with_tier(result: Result, before: Result | None) -> Result:
+    """A result with what was added to the one that it replaces, if both have the same weights and plain scores."""
+    if before is None or _scores(result) != _scores(before):
         return result
-    known = before["splits"]
-    hashes = {name: known[name].get("actions") for name in result["splits"] if name in known}
     splits = {
-        name: split | ({"actions": hashes[name]} if hashes.get(name) else {})
-        for name, split in result["splits"].items()
+        name: replace(split, actions=before.splits[name].actions or split.actions) if name in before.splits else split
+        for name, split in result.splits.items()
     }
-    splits |= {name: split for name, split in known.items() if PLUS in name and name not in splits}
-    kept = {name: before[name] for name in STAMPED if name in before}
-    return {**result, "splits": splits, **kept}
+    splits |= {name: split for name, split in before.splits.items() if PLUS in name and name not in splits}
+    return replace(result, splits=splits, tier=before.tier or result.tier, fresh=before.fresh or result.fresh)
 
 
-def _scores(result: dict[str, Any]) -> tuple[dict[str, list[float]], str | None]:
+def _scores(result: Result) -> tuple[dict[str, list[float]], str | None]:
     """The scores of every plain split, and the hash of the weights that reached them."""
-    scores = {name: split["scores"] for name, split in result["splits"].items() if PLUS not in name}
-    return scores, (result.get("training") or {}).get("sha256")
+    return {name: split.scores for name, split in _plain(result).items()}, _weights(result)
 
 
-def _installed_learner(run: RunFolder, result: dict[str, Any]) -> Learner | None:
+def _weights(result: Result) -> str | None:
+    """The SHA-256 of the weights of a result; None if it has none."""
+    return result.training.sha256 if result.training else None
+
+
+def _installed_learner(run: RunFolder, result: Result) -> Learner | None:
     """The learner whose weights ship with a result; None for a method in a file, and for one without own weights.
 
     Raises DamagedFile, UnknownMethod, BadSettings, AgentError.
     """
-    config = schemas.read(run.config, schemas.METHOD_CONFIG)
-    if config["code"]["sha256"] or specs.parse(config["code"]["class"]).kind != "module":
+    config = records.read(run.config, RunConfig)
+    if config.code is None or config.settings is None:
+        raise atomic.OtherForm(run.config, f"it lacks {'code' if config.code is None else 'settings'!r}")
+    if config.code.sha256 or specs.parse(config.code.name).kind != "module":
         return None  # A config never makes the code of a file run.
     try:
-        method = registry.create(config["code"]["class"], config["settings"])
+        method = registry.create(config.code.name, config.settings)
     except (registry.BadSettings, AgentError) as error:
         raise AgentError(f"{error} (with the settings in {run.config})") from error
-    if (label := registry.label(method)) != result["method"]:
-        raise atomic.OtherForm(run.config, f"it is of {label!r}, and the result is of {result['method']!r}")
+    if (label := registry.label(method)) != result.method:
+        raise atomic.OtherForm(run.config, f"it is of {label!r}, and the result is of {result.method!r}")
     return method if isinstance(method, Learner) else None  # A policy transfer has no weights of its own.
 
 

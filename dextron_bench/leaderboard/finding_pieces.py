@@ -11,7 +11,7 @@ from dextron_bench.leaderboard import fresh_baselines
 from dextron_bench.leaderboard.baseline_check import Finding
 from dextron_bench.leaderboard.verify_board import Row
 from dextron_bench.methods import registry
-from dextron_bench.storage import atomic, hashing, provenance, schemas, shares
+from dextron_bench.storage import atomic, hashing, provenance, records, shares
 from dextron_bench.world import model
 
 FILE = ".finding"  # Ending of the file of a piece, beside its stamp.
@@ -50,17 +50,17 @@ class FindingPieces:
 
     def config_of(self, row: Row) -> dict[str, Any]:
         """What a finding depends on: the published files of the row, the code of its method, and the flags."""
-        fresh = [self.board / fresh_baselines.FOLDER / f"{row.result['reaches']}{end}" for end in (".json", ".parquet")]
+        fresh = [self.board / fresh_baselines.FOLDER / f"{row.result.reaches}{end}" for end in (".json", ".parquet")]
         files = {file.name: file for file in (row.run.result, row.run.episodes, row.run.fresh, *fresh) if file.exists()}
         hashes = {name: hashing.sha256(file) for name, file in files.items()}
-        method = row.result.get("maker", {}).get("method")
+        method = row.result.maker.method if row.result.maker else None
         code = registry.package_files(registry.find_method(method)) if method in registry.installed_methods() else []
         return {"physics": model.mjcf_hash(), "files": hashes, "code": provenance.code_hash(*code), **self.flags}
 
 
 def finding_of(piece: shares.Piece) -> Finding:
     """The finding of a piece; raises DamagedFile."""
-    return Finding(**schemas.read(next(iter(piece.files)), schemas.FINDING))
+    return records.read(next(iter(piece.files)), Finding)
 
 
 def _name(row: Row) -> str:

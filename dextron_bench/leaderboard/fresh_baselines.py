@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
+from msgspec.structs import replace
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard.baseline_check import drawn_rows, play_rows
 from dextron_bench.reaches import sources
-from dextron_bench.splits.fresh_settings import FreshSettings, from_frame, to_frame
+from dextron_bench.splits.fresh_settings import FreshScores, FreshSettings, from_frame, to_frame
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic, schemas, tables
+from dextron_bench.storage import atomic, records, tables
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import replay_check
@@ -53,29 +54,31 @@ def stored_settings(board: Path, reaches: str) -> tuple[FreshSettings, list[Spli
     about = file.with_suffix(".json")
     if not (about.exists() and file.exists()):
         return None
-    fresh = FreshSettings(**schemas.read(about, schemas.FRESH_SETTINGS))
+    fresh = records.read(about, FreshSettings)
     return fresh, from_frame(tables.read_own(file, tables.CASES), reaches)
 
 
 def play(
-    run: RunFolder, result: dict[str, Any], fresh: FreshSettings, splits: list[Split], threads: int, report: Progress
+    run: RunFolder, result: Result, fresh: FreshSettings, splits: list[Split], threads: int, report: Progress
 ) -> None:
     """Plays fresh settings with the agent of a baseline's row, and writes the scores into its result."""
     parts, total = [], sum(len(split) for split in splits)
     for split in splits:
         parts.append(play_rows(run, result, split, np.arange(len(split)), threads))
         report(sum(map(len, parts)), total)
-    atomic.write_json(run.result, {**result, "fresh": fresh.scores(pd.concat(parts))})
+    atomic.write_json(run.result, replace(result, fresh=fresh.scores(pd.concat(parts))))
 
 
 def problems(
-    run: RunFolder, result: dict[str, Any], board: Path, count: int, redraw: bool, threads: int, report: Progress
+    run: RunFolder, result: Result, board: Path, count: int, redraw: bool, threads: int, report: Progress
 ) -> list[str]:
     """How the fresh scores of a row differ from its episodes, played again; empty if they are equal.
 
     Of a baseline, `count` rows of each split are played, 0 for all. With `redraw`, the settings are drawn again, too.
     """
-    claimed, reaches = result["fresh"], result["reaches"]
+    claimed, reaches = result.fresh, result.reaches
+    if claimed is None:
+        return []
     if run.fresh.exists():
         splits = from_frame(tables.read_own(run.fresh, tables.FRESH_EPISODES), reaches)
         faults = _faults_of_submission(run, claimed, splits, threads, report)
@@ -83,42 +86,42 @@ def problems(
         return [f"its fresh settings are missing from {board / FOLDER}"]
     else:
         stored, splits = known
-        if (stored.submission, stored.beacon) != (claimed["submission"], claimed["beacon"]):
+        if (stored.submission, stored.beacon) != (claimed.submission, claimed.beacon):
             return ["it played other fresh settings than the other baselines"]
-        faults = _faults_of_baseline(run, result, splits, count, threads)
+        faults = _faults_of_baseline(run, result, claimed, splits, count, threads)
     return faults or (_redrawn(claimed, reaches, splits, threads, report) if redraw else [])
 
 
 def _faults_of_submission(
-    run: RunFolder, claimed: dict[str, Any], splits: list[Split], threads: int, report: Progress
+    run: RunFolder, claimed: FreshScores, splits: list[Split], threads: int, report: Progress
 ) -> list[str]:
     """How the fresh scores of a submission's row differ from its actions, played again."""
     table = tables.read_own(run.fresh, tables.FRESH_EPISODES)
     source = sources.open_source(splits[0].reaches)
     replayed = replay_check.replay_table(source, splits, table, threads, report)
-    stated = FreshSettings(claimed["submission"], claimed["beacon"])
+    stated = FreshSettings(claimed.submission, claimed.beacon)
     if replayed.exact == replayed.episodes and stated.scores(replayed.rows) == claimed:
         return []
     return ["its scores on fresh settings differ from its actions, played again", *replayed.differing]
 
 
 def _faults_of_baseline(
-    run: RunFolder, result: dict[str, Any], splits: list[Split], count: int, threads: int
+    run: RunFolder, result: Result, claimed: FreshScores, splits: list[Split], count: int, threads: int
 ) -> list[str]:
     """How the fresh scores of a baseline's row differ from the scores of its agent, run again."""
     for split in splits:
-        known = result["fresh"]["splits"].get(split.name, {"digest": "", "scores": []})
-        if known["digest"] != split.digest or len(known["scores"]) != len(split):
+        known = claimed.splits.get(split.name)
+        if known is None or known.digest != split.digest or len(known.scores) != len(split):
             return [f"it has no scores for every fresh setting of {split.name}"]
         rows = drawn_rows(len(split), count)
-        if play_rows(run, result, split, rows, threads)["score"].tolist() != [known["scores"][row] for row in rows]:
+        if play_rows(run, result, split, rows, threads)["score"].tolist() != [known.scores[row] for row in rows]:
             return [f"its scores on fresh settings of {split.name} differ from its episodes, run again"]
     return []
 
 
-def _redrawn(claimed: dict[str, Any], reaches: str, splits: list[Split], threads: int, report: Progress) -> list[str]:
+def _redrawn(claimed: FreshScores, reaches: str, splits: list[Split], threads: int, report: Progress) -> list[str]:
     """A problem if the settings do not follow from the hash of the submission and the beacon."""
-    fresh = FreshSettings(claimed["submission"], claimed["beacon"], len(splits[0]))
+    fresh = FreshSettings(claimed.submission, claimed.beacon, len(splits[0]))
     again = {split.name: split.digest for split in fresh.draw(reaches, threads, report)}
     differing = [split.name for split in splits if again.get(split.name) != split.digest]
     return [f"its fresh settings of {', '.join(differing)} do not follow from its beacon"] if differing else []

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
+from dextron_bench.evaluation.results import Result, scores_by_split
 from dextron_bench.leaderboard.baseline_check import play_rows
-from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import Split, UnknownSplit, load_split, splits_under
 from dextron_bench.splits.tracks import TRACKS
 from dextron_bench.storage import atomic
@@ -26,18 +26,18 @@ def splits_to_play(reaches: str, split: str, tracks: Sequence[str] = ()) -> list
     return [load_split(reaches, name) for track in TRACKS for name in _under(reaches, split, track)]
 
 
-def missing(result: dict[str, Any], splits: Sequence[Split]) -> list[Split]:
+def missing(result: Result, splits: Sequence[Split]) -> list[Split]:
     """The splits, among some, that a row has not played in their present version."""
-    played = {name: part["digest"] for name, part in result["splits"].items()}
+    played = {name: part.digest for name, part in result.splits.items()}
     return [split for split in splits if played.get(split.name) != split.digest]
 
 
-def play(run: RunFolder, result: dict[str, Any], splits: Sequence[Split], threads: int, report: Progress) -> None:
+def play(run: RunFolder, result: Result, splits: Sequence[Split], threads: int, report: Progress) -> None:
     """Plays splits with the agent of a baseline's row, and writes the scores of each into its result."""
     done, total = 0, sum(len(split) for split in splits)
     for split in splits:
         table = play_rows(run, result, split, np.arange(len(split)), threads)
-        result = {**result, "splits": {**result["splits"], **result_files.scores_by_split(table)}}
+        result = replace(result, splits=result.splits | scores_by_split(table))
         atomic.write_json(run.result, result)
         report(done := done + len(split), total)
 

@@ -7,8 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
+from msgspec.structs import asdict, replace
+
+from dextron_bench.evaluation.declaration import Declaration
+from dextron_bench.evaluation.results import Result, scores_by_split
 from dextron_bench.leaderboard import baseline_check, build, collect, fresh_baselines
 from dextron_bench.leaderboard.baseline_check import Finding
 from dextron_bench.leaderboard.highlights import FOLDER
@@ -16,11 +19,12 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage import atomic, hashing, schemas
+from dextron_bench.storage import atomic, hashing, records
 from dextron_bench.storage.folders import copy_tree, visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder, seed_folders
 from dextron_bench.submissions import bundle, episode_tables, replay_check
+from dextron_bench.submissions.manifest import Manifest
 
 BUILT = (".md", ".csv", ".json", ".html")  # Files that are compared byte by byte; pictures are not.
 
@@ -34,12 +38,12 @@ class Row:
     """A result on the board."""
 
     run: RunFolder
-    result: dict[str, Any]
+    result: Result
 
     @property
     def name(self) -> str:
         """Method, source of reaches and seed, in words."""
-        return f"{self.result['method']}, {self.result['reaches']} reaches, seed {self.result['seed']}"
+        return f"{self.result.method}, {self.result.reaches} reaches, seed {self.result.seed}"
 
 
 def rows(board: Path, methods: Sequence[str] = (), reaches: Sequence[str] = ()) -> list[Row]:
@@ -47,10 +51,10 @@ def rows(board: Path, methods: Sequence[str] = (), reaches: Sequence[str] = ()) 
     published = [
         Row(run, result_files.read_result(run.result)) for run in result_files.finished(board / collect.RESULTS)
     ]
-    selected = [row for row in published if not methods or row.result["method"] in methods]
-    selected = [row for row in selected if not reaches or row.result["reaches"] in reaches]
+    selected = [row for row in published if not methods or row.result.method in methods]
+    selected = [row for row in selected if not reaches or row.result.reaches in reaches]
     if not selected:
-        names = ", ".join(sorted({row.result["method"] for row in published})) or "none"
+        names = ", ".join(sorted({row.result.method for row in published})) or "none"
         raise NothingToVerify(f"{board} has no such rows; its methods: {names}")
     return selected
 
@@ -67,7 +71,7 @@ def check(
             finding = _replay(row, threads, report)
         else:
             finding = baseline_check.rerun(row.run, row.result, count, threads, report)
-        if "fresh" in row.result and not finding.problems:
+        if not finding.problems:
             finding.problems += fresh_baselines.problems(row.run, row.result, board, count, redraw, threads, report)
     except MissingData as error:
         return Finding("", [f"not checked: {error}"])
@@ -76,10 +80,10 @@ def check(
 
 def stamp(row: Row, finding: Finding) -> bool:
     """Writes tier and hashes of actions into a baseline's result and returns True, if all its rows ran again."""
-    if finding.problems or finding.actions.keys() != row.result["splits"].keys():
+    if finding.problems or finding.actions.keys() != row.result.splits.keys():
         return False
-    splits = {name: split | {"actions": finding.actions[name]} for name, split in row.result["splits"].items()}
-    atomic.write_json(row.run.result, {**row.result, "splits": splits, "tier": "re-run"})
+    splits = {name: replace(split, actions=finding.actions[name]) for name, split in row.result.splits.items()}
+    atomic.write_json(row.run.result, replace(row.result, splits=splits, tier="re-run"))
     return True
 
 
@@ -97,27 +101,28 @@ def differing_files(board: Path) -> list[str]:
 
 def _replay(row: Row, threads: int, report: Progress) -> Finding:
     """Replays the actions of a submission's row."""
-    reaches = row.result["reaches"]
+    reaches = row.result.reaches
     splits = [load_split(reaches, name) for name in ranking_splits(reaches)]
     table = episode_tables.read(row.run.episodes, splits)
     if faults := list(episode_tables.faults(table, splits)):
         return Finding("", faults)
     replayed = replay_check.replay_table(sources.open_source(reaches), splits, table, threads, report)
-    manifest = schemas.read(row.run.path.parent / bundle.MANIFEST, schemas.MANIFEST)
-    claims = [row.result.get(name) for name in ("method", "reaches", "declared")]
-    if claims != [manifest.get(name) for name in ("name", "reaches", "declared")]:
+    manifest = records.read(row.run.path.parent / bundle.MANIFEST, Manifest)
+    declared = Declaration(**asdict(manifest.declared))
+    claims = (row.result.method, row.result.reaches, row.result.declared)
+    if claims != (manifest.name, manifest.reaches, declared):
         return Finding("", ["its name, reaches or declarations differ from its manifest"])
-    problem = _misplaced(row, [f"seed{seed}" for seed in manifest.get("seeds", [])])
-    if problem := problem or _other_code(row.run.path.parent, manifest["files"]):
+    problem = _misplaced(row, [f"seed{seed}" for seed in manifest.seeds])
+    if problem := problem or _other_code(row.run.path.parent, manifest.files):
         return Finding("", [problem])
-    if result_files.scores_by_split(replayed.rows) != row.result["splits"]:
+    if scores_by_split(replayed.rows) != row.result.splits:
         return Finding("", ["its result differs from its actions, played again", *replayed.differing[:5]])
     return Finding(f"replayed, {replayed.exact} of {replayed.episodes} episodes equal bit for bit")
 
 
 def _misplaced(row: Row, seeds: Sequence[str]) -> str:
     """Why a submission's row is in the wrong folder or among wrong seeds; empty if folder and seeds are right."""
-    claimed = "/".join((row.result["method"], row.result["reaches"], f"seed{row.result['seed']}"))
+    claimed = "/".join((row.result.method, row.result.reaches, f"seed{row.result.seed}"))
     if row.run.identity != claimed:
         return f"lies in {row.run.identity}, but is of {row.name}"
     present = sorted(run.path.name for run in seed_folders(row.run.path.parent))

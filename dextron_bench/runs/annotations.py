@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from dextron_bench.storage import atomic, run_times, schemas
+from dextron_bench.storage import atomic, records, run_times
 from dextron_bench.storage.run_folder import RunFolder
 
 NOTES = "notes.json"  # In the folder of a method's runs on one source of reaches.
@@ -35,13 +35,16 @@ class Notes:
             raise BadNote(f"a note has at most {LONGEST} characters, not {len(self.note)}")
 
 
+class Failure(records.Record, frozen=True):
+    """Why an attempt of a run failed."""
+
+    error: str
+
+
 def read(folder: Path) -> Notes:
     """The notes in a folder, empty if there are none; raises DamagedFile."""
     file = folder / NOTES
-    if not file.exists():
-        return Notes()
-    content = schemas.read(file, schemas.NOTES)
-    return Notes(tuple(content["tags"]), content["note"])
+    return records.read(file, Notes) if file.exists() else Notes()
 
 
 def write(folder: Path, notes: Notes) -> None:
@@ -51,7 +54,7 @@ def write(folder: Path, notes: Notes) -> None:
 
 def failure(run: RunFolder) -> str:
     """Why the last attempt of a run failed, in one line; empty if it did not. Raises DamagedFile."""
-    return schemas.read(run.failure, schemas.FAILURE)["error"] if run.failure.exists() else ""
+    return records.read(run.failure, Failure).error if run.failure.exists() else ""
 
 
 @contextmanager
@@ -65,7 +68,7 @@ def noting_failure(attempted: Sequence[RunFolder]) -> Iterator[None]:
             if not run.config.exists():
                 continue
             with suppress(OSError):  # A full disk, for example, must not hide the error itself.
-                atomic.write_json(run.failure, {"error": f"{type(error).__name__}: {text}"})
+                atomic.write_json(run.failure, Failure(f"{type(error).__name__}: {text}"))
                 run_times.note_end(run)
         raise
     for run in attempted:

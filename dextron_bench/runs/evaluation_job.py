@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from msgspec.structs import replace
 
 from dextron_bench.evaluation import episode_table
 from dextron_bench.evaluation.episodes import Episode
@@ -18,8 +19,9 @@ from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import recording_files, run_files
 from dextron_bench.runs.recorder import Recorder
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic, provenance, schemas, shares, tables
+from dextron_bench.storage import atomic, provenance, records, shares, tables
 from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.provenance import Provenance
 from dextron_bench.storage.run_folder import RunFolder
 
 ROWS = 128  # In a piece. With other numbers, pieces of different versions do not fit together.
@@ -165,18 +167,18 @@ class EvaluationJob:
         """
         makers = [piece.provenance for piece in pieces.values()]
         if self.folder.episodes.exists() or self.folder.curve.exists():
-            makers.append(schemas.read(self.folder.provenance, schemas.PROVENANCE))
+            makers.append(records.read(self.folder.provenance, Provenance))
         if any(part.name not in pieces for split in left for part in self._pieces_of(split)):
             makers.append(provenance.collect(self.config["physics"]))
         merged = provenance.merged(makers)
-        if self.one_platform and "others" in merged:
+        if self.one_platform and merged.others:
             self._check_platform(merged)
-            del merged["others"]
+            merged = replace(merged, others=())
         atomic.write_json(self.folder.provenance, merged)
 
-    def _check_platform(self, merged: dict[str, Any]) -> None:
+    def _check_platform(self, merged: Provenance) -> None:
         """Raises ForeignPiece if some makers have another platform than the first."""
-        platforms = {provenance.platform_of(maker) for maker in (merged, *merged["others"])}
+        platforms = {provenance.platform_of(maker) for maker in (merged, *merged.others)}
         if len(platforms) > 1:
             raise shares.ForeignPiece(
                 f"{self.folder.path} has pieces of different platforms: {' and '.join(sorted(platforms))}; it may name "

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.evaluation.results import Training
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods import registry, weights
 from dextron_bench.methods.agents import Agent, Privileged, as_agent_error
@@ -15,7 +16,7 @@ from dextron_bench.runs import playing, result_files, run_files
 from dextron_bench.runs.evaluation_job import EvaluationJob, Played
 from dextron_bench.runs.plans import Run, no_weights
 from dextron_bench.splits.loading import Split, load_split
-from dextron_bench.storage import folder_config, hashing, provenance
+from dextron_bench.storage import folder_config, hashing, provenance, records, tensors
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.training import loop
 
@@ -124,7 +125,15 @@ def _training_facts(run: Run, file: Path | None) -> dict[str, Any]:
     if file is None:
         return {}
     facts = weights.metadata(file)
-    if run.learner is None or run.plan.weights:
-        return {"training": facts}
-    count = getattr(run.learner, "demonstrations", lambda episodes: None)
-    return {"training": facts | {"demonstrations": count(len(load_split(run.training_source, "train")))}}
+    if run.learner is not None and not run.plan.weights:
+        count = getattr(run.learner, "demonstrations", lambda episodes: None)
+        facts |= {"demonstrations": count(len(load_split(run.training_source, "train")))}
+    return {"training": _checked(file, facts)}
+
+
+def _checked(file: Path, facts: dict[str, Any]) -> Training:
+    """The facts about a training; raises OtherTensors."""
+    try:
+        return records.convert(facts, Training)
+    except records.Mismatch as error:
+        raise tensors.OtherTensors(file, error) from error

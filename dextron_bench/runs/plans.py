@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.evaluation.results import Code, RunConfig
 from dextron_bench.methods import registry
 from dextron_bench.methods import weights as method_weights
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.registry import Entrant
 from dextron_bench.splits.loading import ranking_splits, splits_under
-from dextron_bench.storage import schemas
+from dextron_bench.storage import records
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.training.jobs import TrainingJob
 
@@ -109,13 +110,13 @@ def beside_other_code(run: Run, runs: Path) -> Run:
 
     A learner keeps its label, which its training and its weights have too.
     """
-    code = run.config()["code"]
-    if run.learner is not None or not code["sha256"]:
+    code = records.convert(run.config()["code"], Code)
+    if run.learner is not None or not code.sha256:
         return run
     folders = [folder for folder in run_folders(runs, run.label) if folder.config.exists()]
-    if all(schemas.read(folder.config, schemas.CONFIG).get("code") == code for folder in folders):
+    if all(records.read(folder.config, RunConfig).code == code for folder in folders):
         return run
-    return replace(run, label=f"{run.label}+{code['sha256'][:8]}")
+    return replace(run, label=f"{run.label}+{code.sha256[:8]}")
 
 
 def with_shipped_weights(run: Run, seeds: Sequence[int]) -> list[Run]:

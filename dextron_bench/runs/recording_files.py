@@ -13,7 +13,7 @@ from dextron_bench.evaluation.predictions import StepPredictions
 from dextron_bench.experts.policies import Case
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage import atomic, records
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.success import network
 from dextron_bench.success.predict import predict
@@ -61,7 +61,7 @@ def add_to_manifest(folder: RunFolder, hashes: dict[str, str]) -> None:
 
 def manifest(folder: RunFolder) -> dict[str, str]:
     """The SHA-256 of each recording of a run by the file's name; raises DamagedFile."""
-    return schemas.read(folder.manifest, schemas.RECORDINGS) if folder.manifest.exists() else {}
+    return records.read(folder.manifest, dict[str, str]) if folder.manifest.exists() else {}
 
 
 def _predictions(source: Source, case: Case, episode: Episode) -> StepPredictions | None:

@@ -8,15 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from msgspec.structs import replace
 
-from dextron_bench.evaluation.episodes import action_hashes
+from dextron_bench.evaluation.results import Maker, Result, scores_by_split
 from dextron_bench.methods.registry import NAME
-from dextron_bench.storage import atomic, provenance, run_times, schemas
+from dextron_bench.storage import atomic, records, run_times
 from dextron_bench.storage.folders import visible
+from dextron_bench.storage.provenance import Provenance
 from dextron_bench.storage.run_folder import RunFolder, run_folders, seed_folders
 
-MAKER = ("method", "code", "settings")  # Entries of the config in the result; with them the agent can be made again.
-Results = Sequence[dict[str, Any]]
+Results = Sequence[Result]
 
 
 class UnknownResult(LookupError):
@@ -29,35 +30,17 @@ def write_result(folder: RunFolder, table: pd.DataFrame, about: dict[str, Any], 
     A result that does not change leaves the end as it was. `seconds` of training belong to the provenance, since they
     differ each time.
     """
-    config = schemas.read(folder.config, schemas.CONFIG)
-    made_by = schemas.read(folder.provenance, schemas.PROVENANCE)
-    made_by |= {} if seconds is None else {"seconds": seconds}
-    maker = {name: config[name] for name in MAKER if name in config}
-    result = {**about, "splits": scores_by_split(table), "provenance": made_by, "maker": maker}
+    maker = records.read(folder.config, Maker)
+    made_by = records.read(folder.provenance, Provenance)
+    made_by = made_by if seconds is None else replace(made_by, seconds=seconds)
+    result = Result(**about, splits=scores_by_split(table), provenance=made_by, maker=maker)
     before = folder.result.read_bytes() if folder.result.exists() else b""
     atomic.write_json(folder.result, result)
     if folder.result.read_bytes() != before:
         run_times.note_end(folder)
 
 
-def scores_by_split(table: pd.DataFrame) -> dict[str, Any]:
-    """What a result says of each split, computed from the rows of its episodes."""
-    return {str(name): _scores(rows) for name, rows in table.groupby("split", sort=False)}
-
-
-def _scores(rows: pd.DataFrame) -> dict[str, Any]:
-    scores = {
-        "digest": rows["digest"].iloc[0],
-        "scores": rows["score"].tolist(),
-        "failed": int((rows["failure"] != "").sum()),
-        "causes": {cause: int(count) for cause, count in rows["cause"].value_counts(sort=False).items()},
-        "closing_lag": None if rows["closing_lag"].isna().all() else round(float(rows["closing_lag"].median()), 3),
-    }
-    actions = rows["actions"] if "actions" in rows else pd.Series([None])
-    return scores if actions.isna().any() else scores | {"actions": action_hashes(actions)}
-
-
-def results(runs: Path) -> Iterator[dict[str, Any]]:
+def results(runs: Path) -> Iterator[Result]:
     """Every result below a folder of runs; raises DamagedFile."""
     return (read_result(run.result) for run in finished(runs))
 
@@ -67,9 +50,9 @@ def finished(runs: Path, label: str = "*") -> list[RunFolder]:
     return [run for run in run_folders(runs, label) if run.result.exists()]
 
 
-def read_result(file: Path) -> dict[str, Any]:
+def read_result(file: Path) -> Result:
     """The content of a `result.json`; raises DamagedFile."""
-    return schemas.read(file, schemas.RESULT)
+    return records.read(file, Result)
 
 
 def published_results() -> Path:
@@ -79,15 +62,15 @@ def published_results() -> Path:
     return shipped if shipped.is_dir() else package.parent / "leaderboard" / "results"
 
 
-def published_beside(new: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def published_beside(new: Results) -> list[Result]:
     """The published results of other methods than these, on the splits and the physics that these results have too."""
-    methods = {result["method"] for result in new}
-    physics = {provenance.physics_of(result) for result in new} - {""}
-    digests = {split["digest"] for result in new for split in result["splits"].values()}
+    methods = {result.method for result in new}
+    physics = {result.physics for result in new} - {""}
+    digests = {split.digest for result in new for split in result.splits.values()}
     return [
-        result | {"splits": {name: split for name, split in result["splits"].items() if split["digest"] in digests}}
+        replace(result, splits={name: split for name, split in result.splits.items() if split.digest in digests})
         for result in results(published_results())
-        if result["method"] not in methods and provenance.physics_of(result) in physics
+        if result.method not in methods and result.physics in physics
     ]
 
 
@@ -104,7 +87,7 @@ def find(name: str, runs: Path, split: str = "") -> Results:
             f"no result of {name!r}: {runs} has {_labels(runs)}, and published results are "
             f"{_labels(published_results())}; give one of them, or the path of a run"
         )
-    if len(labels := {result["method"] for result in results}) > 1:
+    if len(labels := {result.method for result in results}) > 1:
         raise UnknownResult(f"{name!r} holds results of {_listed(labels)}; give one of them")
     return results
 
@@ -113,7 +96,7 @@ def _files(name: str, runs: Path, split: str) -> list[Path]:
     """The files of a method's results."""
     if NAME.fullmatch(name):
         mine, published = finished(runs, name), finished(published_results(), name)
-        played = {_source(run) for run in mine if not split or split in read_result(run.result)["splits"]}
+        played = {_source(run) for run in mine if not split or split in read_result(run.result).splits}
         instead = [run for run in published if _source(run) not in played]
         replaced = {_source(run) for run in instead}
         if mine or instead:

@@ -5,18 +5,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.scores import paired, statistics
 from dextron_bench.splits import strata
-from dextron_bench.storage import provenance
 from dextron_bench.world import task
 
 ALL = "all"  # The group of all settings.
-Results = Sequence[dict[str, Any]]  # Contents of `result.json`, one for each seed.
+Results = Sequence[Result]  # One for each seed.
 
 
 class Incomparable(ValueError):
@@ -138,10 +137,10 @@ def align(
 
     Raises Incomparable.
     """
-    sources_a, sources_b = ({result["reaches"] for result in seeds} for seeds in results)
+    sources_a, sources_b = ({result.reaches for result in seeds} for seeds in results)
     source = _common_source(sources_a, sources_b, reaches)
     a, b = (_seed_scores(name, seeds, source, split) for name, seeds in zip(names, results, strict=True))
-    worlds = {provenance.physics_of(result)[:8] for seeds in results for result in seeds if result["reaches"] == source}
+    worlds = {result.physics[:8] for seeds in results for result in seeds if result.reaches == source}
     if len(worlds) > 1:
         raise Incomparable(
             f"the results were played with different physics, {_sorted_list(worlds)}; run the older again"
@@ -155,23 +154,21 @@ def align(
 
 
 def _seed_scores(name: str, results: Results, reaches: str, split: str) -> SeedScores:
-    seeds = [result for result in results if result["reaches"] == reaches]
-    if without_split := [result for result in seeds if split not in result["splits"]]:
+    seeds = [result for result in results if result.reaches == reaches]
+    if without_split := [result for result in seeds if split not in result.splits]:
         advice = "; play it, or give the path of other results"
         if without_split != seeds:
             advice = "; other seeds have it: to compare one of them, give its folder"
         raise Incomparable(
-            f"{name}, seed {without_split[0]['seed']}, has no split {split!r} of {reaches} reaches; "
-            f"it has {_sorted_list(without_split[0]['splits'])}{advice}"
+            f"{name}, seed {without_split[0].seed}, has no split {split!r} of {reaches} reaches; "
+            f"it has {_sorted_list(without_split[0].splits)}{advice}"
         )
-    splits = [result["splits"][split] for result in seeds]
-    if len({(result["digest"], len(result["scores"])) for result in splits}) > 1:
+    splits = [result.splits[split] for result in seeds]
+    if len({(result.digest, len(result.scores)) for result in splits}) > 1:
         raise Incomparable(
             f"the seeds of {name} played different versions of {split} of {reaches} reaches; run them again"
         )
-    return SeedScores(
-        name, reaches, split, splits[0]["digest"], np.array([result["scores"] for result in splits], float)
-    )
+    return SeedScores(name, reaches, split, splits[0].digest, np.array([result.scores for result in splits], float))
 
 
 def _common_source(sources_a: set[str], sources_b: set[str], requested: str | None) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.reaches.timing import CONTROL_STEP
 from dextron_bench.scores import statistics
 from dextron_bench.splits.tracks import DELAYS, PLUS, TRACKS
@@ -35,17 +35,17 @@ class Robustness:
     area: float
 
 
-def table(results: Iterable[Mapping[str, Any]]) -> list[Robustness]:
+def table(results: Iterable[Result]) -> list[Robustness]:
     """The methods that have played a split plainly and under some track, the best area first within a split.
 
     Only seeds that have played both are compared. The order of methods without an area follows their plain return.
     """
     scores: dict[tuple[str, str, str], list[Mapping[str, list[float]]]] = defaultdict(list)
     for result in results:
-        for split in {name.partition(PLUS)[0] for name in result["splits"] if PLUS in name}:
-            if split in result["splits"]:
-                played = {name: part["scores"] for name, part in result["splits"].items() if _base(name) == split}
-                scores[result["reaches"], split, result["method"]].append(played)
+        for split in {name.partition(PLUS)[0] for name in result.splits if PLUS in name}:
+            if split in result.splits:
+                played = {name: part.scores for name, part in result.splits.items() if _base(name) == split}
+                scores[result.reaches, split, result.method].append(played)
     rows = [_robustness(*key, seeds) for key, seeds in scores.items()]
     return sorted(rows, key=lambda row: (row.reaches, row.split, -np.nan_to_num(row.area, nan=-1.0), -row.plain))
 

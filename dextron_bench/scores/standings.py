@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.evaluation.results import Result, SplitScores
 from dextron_bench.methods import registry
 from dextron_bench.reaches.sources import RankedSource
 from dextron_bench.scores import paired, statistics
 from dextron_bench.splits import strata
+from dextron_bench.splits.fresh_settings import FreshSplitScores
 from dextron_bench.world import task
 
 COLUMNS = (
@@ -23,7 +25,16 @@ COLUMNS = (
     "iqm", "iqm_low", "iqm_high", "regret", *CAUSES, "closing_lag",
     "fresh", "fresh_low", "fresh_high", "gap", "gap_low", "gap_high", "marked",
 )  # fmt: skip
-Board = dict[str, list[dict[str, Any]]]  # By method: what each of its seeds scored on one version of a split.
+
+
+class Seed(NamedTuple):
+    """What a seed of a method scored on a split, and on fresh settings of it if it has played any."""
+
+    known: SplitScores
+    fresh: FreshSplitScores | None
+
+
+Board = dict[str, list[Seed]]  # By method: what each of its seeds scored on one version of a split.
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +49,10 @@ class UnevenResults(ValueError):
     """Results on one version of a split have different numbers of rows, or another number than the split."""
 
 
-def table(results: Iterable[dict[str, Any]]) -> pd.DataFrame:
+def table(results: Iterable[Result]) -> pd.DataFrame:
     """One row for each method, source, split and split version, best first, with the columns COLUMNS.
 
-    `results` are the contents of `result.json` files, one for each seed. Success rates lie in [0, 1]. The columns
+    `results` are one for each seed. Success rates lie in [0, 1]. The columns
     CAUSES count episodes. `closing_lag` [s] is the mean over seeds of their medians, NaN if no hand closed. `rank` is
     NaN for methods that are not ranked, `iqm` for splits that do not ship, `regret` if EXP has no scores.
 
@@ -65,21 +76,20 @@ def is_ranked(method: str, reaches: str) -> bool:
     return method not in registry.CEILINGS and reaches in get_args(RankedSource)
 
 
-def _boards(results: Iterable[dict[str, Any]]) -> dict[tuple[str, str, str], Board]:
+def _boards(results: Iterable[Result]) -> dict[tuple[str, str, str], Board]:
     """The scores of all methods by source of reaches, split and its digest: one board holds comparable scores."""
     boards: dict[tuple[str, str, str], Board] = defaultdict(lambda: defaultdict(list))
     for result in results:
-        for name, split_result in result["splits"].items():
-            fresh = result.get("fresh", {}).get("splits", {}).get(name)
-            board = boards[(result["reaches"], name, split_result["digest"])]
-            board[result["method"]].append(split_result | {"fresh": fresh})
+        for name, known in result.splits.items():
+            fresh = result.fresh.splits.get(name) if result.fresh else None
+            boards[(result.reaches, name, known.digest)][result.method].append(Seed(known, fresh))
     return boards
 
 
 def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
     """The rows of a board. Of a method's numbers, only its rank depends on the other methods."""
     reaches, split, digest = key
-    lengths = {len(seed["scores"]) for seeds in board.values() for seed in seeds}
+    lengths = {len(seed.known.scores) for seeds in board.values() for seed in seeds}
     regions = strata.start_regions(reaches, split, digest)
     lengths |= set() if regions is None else {len(regions)}  # The split's own number of rows.
     if len(lengths) > 1:
@@ -87,8 +97,8 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
             f"results on {split} of {reaches}, version {digest[:8]}, have different numbers of rows: "
             f"{', '.join(map(str, sorted(lengths)))}"
         )
-    scores = {method: np.array([seed["scores"] for seed in seeds], float) for method, seeds in board.items()}
-    fresh = {method: _fresh(method, seeds, scores[method]) for method, seeds in board.items()}
+    scores = {method: np.array([seed.known.scores for seed in seeds], float) for method, seeds in board.items()}
+    fresh = {method: _fresh(seeds, scores[method]) for method, seeds in board.items()}
     marked = {method: known.scores for method, known in fresh.items() if known and known.gap.is_beyond_noise}
     ranked = [method for method in scores if is_ranked(method, reaches)]
     own_settings = [place for place, method in enumerate(ranked) if method in marked]
@@ -101,21 +111,21 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
             **{"rank": ranks.get(method, np.nan), "method": method, "seeds": len(returns), "episodes": returns.size},
             **_estimates(method, returns, regions),
             "regret": ceiling - returns.mean(),
-            **_endings(board[method]),
-            **_fresh_columns(method, fresh[method]),
+            **_endings([seed.known for seed in board[method]]),
+            **_fresh_columns(fresh[method]),
         }
 
 
-def _fresh(method: str, seeds: Sequence[dict[str, Any]], known: np.ndarray) -> Fresh | None:
+def _fresh(seeds: Sequence[Seed], known: np.ndarray) -> Fresh | None:
     """The scores of a method on fresh settings; None if some seed has none, or if seeds played different ones."""
-    played = [seed["fresh"] for seed in seeds]
-    if None in played or len({one["digest"] for one in played}) > 1:
+    played = [seed.fresh for seed in seeds if seed.fresh]
+    if len(played) < len(seeds) or len({one.digest for one in played}) > 1:
         return None
-    scores = np.array([one["scores"] for one in played], float)
+    scores = np.array([one.scores for one in played], float)
     return Fresh(scores, paired.gap(known, scores))
 
 
-def _fresh_columns(method: str, fresh: Fresh | None) -> dict[str, Any]:
+def _fresh_columns(fresh: Fresh | None) -> dict[str, float]:
     """Mean return on fresh settings and gap with their intervals, and whether the gap is beyond noise."""
     if fresh is None:
         return {"marked": False}
@@ -145,11 +155,11 @@ def _method_rng(method: str) -> np.random.Generator:
     return np.random.default_rng([0, *method.encode()])
 
 
-def _endings(seeds: list[dict[str, Any]]) -> dict[str, Any]:
+def _endings(seeds: list[SplitScores]) -> dict[str, float]:
     """How many episodes of all seeds end by each cause, how many failed, and the closing lag."""
-    lags = [seed["closing_lag"] for seed in seeds if seed["closing_lag"] is not None]
+    lags = [seed.closing_lag for seed in seeds if seed.closing_lag is not None]
     return {
-        "failed": sum(seed["failed"] for seed in seeds),
-        **{cause: sum(seed["causes"].get(cause, 0) for seed in seeds) for cause in CAUSES},
+        "failed": sum(seed.failed for seed in seeds),
+        **{cause: sum(seed.causes.get(cause, 0) for seed in seeds) for cause in CAUSES},
         "closing_lag": float(np.mean(lags)) if lags else np.nan,
     }

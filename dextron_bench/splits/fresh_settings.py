@@ -5,7 +5,6 @@ from __future__ import annotations
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import pandas as pd
 
@@ -14,9 +13,25 @@ from dextron_bench.reaches import setting
 from dextron_bench.splits import fresh
 from dextron_bench.splits.loading import Split, cases_from_frame, ranking_splits, split_digest
 from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.records import Record, Scores
 from dextron_bench.world.engine import Engine
 
 EXPERT = ["gain", "critical"]
+
+
+class FreshSplitScores(Record, frozen=True):
+    """The score of every fresh setting of a split."""
+
+    digest: str
+    scores: Scores
+
+
+class FreshScores(Record, frozen=True):
+    """What a row scores on fresh settings, by split, and what the settings follow from (see `FreshSettings`)."""
+
+    beacon: str
+    submission: str
+    splits: dict[str, FreshSplitScores]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +57,13 @@ class FreshSettings:
 
         return [draw_one(name) for name in ranking_splits(reaches)]
 
-    def scores(self, table: pd.DataFrame) -> dict[str, Any]:
+    def scores(self, table: pd.DataFrame) -> FreshScores:
         """The entry `fresh` of a result, from the table of its episodes on fresh settings."""
         by_split = {
-            str(name): {"digest": rows["digest"].iloc[0], "scores": rows["score"].tolist()}
+            str(name): FreshSplitScores(rows["digest"].iloc[0], rows["score"].tolist())
             for name, rows in table.sort_values(["split", "row"]).groupby("split", sort=False)
         }
-        return {"beacon": self.beacon, "submission": self.submission, "splits": by_split}
+        return FreshScores(self.beacon, self.submission, by_split)
 
 
 def to_frame(splits: Sequence[Split]) -> pd.DataFrame:

@@ -11,6 +11,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
+import msgspec
+
 PART = ".part"  # Ending of the names of files and folders that are not complete; these names start with a dot.
 ABANDONED = 24 * 3600.0  # [s] since the last change of a temporary file whose process has surely ended.
 LACKING = {  # What a file system answers to a call that it does not have; a full disk or a fault answers otherwise.
@@ -142,18 +144,23 @@ def naming(file: Path) -> Iterator[None]:
 
 
 def write_json(file: Path, value: Any) -> None:
-    """Writes a JSON file atomically, with sorted keys."""
+    """Writes a JSON file atomically, with sorted keys; the value may hold records."""
     write_atomically(file, _json(value))
 
 
 def _json(value: Any) -> Callable[[Path], object]:
     """What writes a value as JSON."""
-    text = json.dumps(value, indent=1, sort_keys=True) + "\n"
+    text = json_text(value, indent=1) + "\n"
     return lambda part: part.write_text(text, encoding="utf-8")
 
 
+def json_text(value: Any, indent: int | None = None) -> str:
+    """A value, with the records in it, as JSON with sorted keys."""
+    return json.dumps(value, indent=indent, sort_keys=True, default=msgspec.to_builtins)
+
+
 def read_json(file: Path) -> dict[str, Any]:
-    """Reads a JSON object from a file; raises DamagedFile. `schemas.read` also checks its content."""
+    """Reads a JSON object from a file; raises DamagedFile. `records.read` also checks its content."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse)
     except (ValueError, RecursionError) as error:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.storage import atomic, provenance, run_times, schemas
+from dextron_bench.storage import atomic, provenance, records, run_times
 from dextron_bench.storage.run_folder import RunFolder
 
 TRIES, PAUSE = 10, 0.1  # Looks at an empty config, and seconds between them; then it is damaged.
@@ -69,7 +69,7 @@ def _check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> 
         if file.stat().st_size:
             break
         time.sleep(PAUSE)
-    stored, expected = schemas.read(file, schemas.OBJECT), json.loads(json.dumps(config))
+    stored, expected = records.read(file, dict[str, Any]), json.loads(atomic.json_text(config))
     if names := list(differences(stored, expected)):
         raise FolderMismatch(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")
 

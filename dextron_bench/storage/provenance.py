@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import re
@@ -11,11 +10,14 @@ from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+
+from msgspec import UNSET, UnsetType, field
+from msgspec.structs import replace
 
 from dextron_bench.processes import programs
-from dextron_bench.storage import hashing
+from dextron_bench.storage import atomic, hashing
 from dextron_bench.storage.folders import visible
+from dextron_bench.storage.records import Amount, Count, Record
 
 PACKAGES = ("dextron-bench", "mujoco", "dm-control", "numpy", "scipy", "pandas", "pyarrow", "torch", "rerun-sdk")
 PLAYING = ("reaches", "world", "experts", "splits", "methods", "evaluation")  # Packages that episodes follow from.
@@ -24,48 +26,75 @@ REACHES = "data/synthetic-reaches.npz"  # The file that synthetic reaches follow
 VECTORS = re.compile(r"ssse3|sse\w*|avx\w*|fma4?|f16c|xop|amx\w*|neon|asimd\w*|sve\w*|sme(2\w*|[a-z]+\d\w*)?")
 
 
-def collect(physics: str) -> dict[str, Any]:
-    """Code, versions and machine of this process, and the hash of its physics, as plain JSON values."""
-    return {
-        "git": _git("rev-parse", "HEAD"),
-        "dirty": None if (changes := _git("status", "--porcelain")) is None else bool(changes),
-        "versions": {name: version_of(name) for name in PACKAGES},
-        "python": platform.python_version(),
-        "machine": {
-            "system": platform.platform(),
-            "cpu": _cpu_info("model name") or platform.processor() or platform.machine(),
-            "cores": os.cpu_count(),
-            "vector_extensions": vector_extensions(),
-        },
-        "physics": physics,
-    }
+class Machine(Record, frozen=True):
+    """The machine that made a file. Files of earlier versions do not have its vector extensions."""
+
+    system: str = ""
+    cpu: str = ""
+    cores: Count | UnsetType | None = UNSET
+    vector_extensions: list[str] | UnsetType | None = UNSET
+
+    @property
+    def extensions(self) -> list[str] | None:
+        """The names of its vector instructions; None if they are not known."""
+        return None if self.vector_extensions is UNSET else self.vector_extensions
 
 
-def physics_of(result: dict[str, Any]) -> str:
-    """The hash of the physics with which the episodes of a result were played; empty if it does not say."""
-    return str((result.get("provenance") or {}).get("physics") or "")
+class Provenance(Record, frozen=True):
+    """The process that made a file, and the `others` if several made it. `physics` is the hash of its physics.
+
+    `seconds` is the time of a training.
+    """
+
+    git: str | UnsetType | None = UNSET
+    dirty: bool | UnsetType | None = UNSET
+    versions: dict[str, str | None] = field(default_factory=dict)
+    python: str = ""
+    machine: Machine = Machine()
+    physics: str = ""
+    seconds: Amount | None = None
+    others: tuple[Provenance, ...] = ()
 
 
-def merged(makers: Iterable[dict[str, Any]]) -> dict[str, Any]:
+def collect(physics: str) -> Provenance:
+    """Code, versions and machine of this process, and the hash of its physics."""
+    changes = _git("status", "--porcelain")
+    return Provenance(
+        git=_git("rev-parse", "HEAD"),
+        dirty=None if changes is None else bool(changes),
+        versions={name: version_of(name) for name in PACKAGES},
+        python=platform.python_version(),
+        machine=Machine(
+            platform.platform(),
+            _cpu_info("model name") or platform.processor() or platform.machine(),
+            os.cpu_count(),
+            vector_extensions(),
+        ),
+        physics=physics,
+    )
+
+
+def merged(makers: Iterable[Provenance]) -> Provenance:
     """The provenance of a file that several processes made: one of them, and under `others` the rest, without doubles.
 
     It does not depend on the order of the processes. Processes of one machine with equal versions count as one.
     """
-    distinct = {
-        json.dumps(one, sort_keys=True): one
-        for maker in makers
-        for one in ({name: maker[name] for name in maker if name != "others"}, *maker.get("others", ()))
-    }
+    processes = (replace(one, others=()) for maker in makers for one in (maker, *maker.others))
+    distinct = {atomic.json_text(one): one for one in processes}
     first, *others = (distinct[text] for text in sorted(distinct))
-    return {**first, "others": others} if others else first
+    return replace(first, others=tuple(others))
 
 
-def platform_of(maker: dict[str, Any]) -> str:
+def platform_of(maker: Provenance) -> str:
     """What the last bits of episodes may depend on: the system, the processor with its instructions, and MuJoCo."""
-    machine, versions = maker.get("machine") or {}, maker.get("versions") or {}
-    extensions = hashing.digest(" ".join(machine.get("vector_extensions") or ()).encode())[:8]
-    system = str(machine.get("system")).partition("-")[0]
-    return f"{system}, {machine.get('cpu')} ({extensions}), MuJoCo {versions.get('mujoco')}"
+    machine = maker.machine
+    extensions = hashing.digest(" ".join(machine.extensions or ()).encode())[:8]
+    return f"{system_of(machine)}, {machine.cpu} ({extensions}), MuJoCo {maker.versions.get('mujoco')}"
+
+
+def system_of(machine: Machine) -> str:
+    """The name of the operating system."""
+    return machine.system.partition("-")[0]
 
 
 def code_hash(*more: Path) -> str:
@@ -116,7 +145,7 @@ def _git(*arguments: str) -> str | None:
 def vector_extensions() -> list[str] | None:
     """Names of the processor's vector instructions, sorted; None where the system does not list them.
 
-    The last bits of results may depend on them. Files of earlier versions do not have this entry.
+    The last bits of results may depend on them.
     """
     features = _cpu_info("flags") or _cpu_info("Features")  # The name on x86, and on ARM.
     return sorted(filter(VECTORS.fullmatch, features.split())) if features else None

@@ -7,23 +7,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Annotated
 
-from dextron_bench.storage import atomic, schemas
+from msgspec import Meta
+
+from dextron_bench.storage import atomic, records
 from dextron_bench.storage.run_folder import RunFolder
+
+Moment = Annotated[datetime, Meta(tz=True)]
 
 
 @dataclass(frozen=True, slots=True)
 class RunTimes:
     """When a run began, and when its result was written or it failed; None where this is not known."""
 
-    began: datetime | None = None
-    ended: datetime | None = None
+    began: Moment | None = None
+    ended: Moment | None = None
 
 
 def read(run: RunFolder) -> RunTimes:
     """The times of a run; raises DamagedFile."""
-    content = schemas.read(run.times, schemas.TIMES) if run.times.exists() else {}
-    return RunTimes(**{name: datetime.fromisoformat(content[name]) for name in ("began", "ended") if name in content})
+    return records.read(run.times, RunTimes) if run.times.exists() else RunTimes()
 
 
 def note_begin(run: RunFolder) -> None:
@@ -34,8 +38,8 @@ def note_begin(run: RunFolder) -> None:
 
 def note_end(run: RunFolder) -> None:
     """Notes that a run has ended, in the place of an earlier end; raises DamagedFile."""
-    content = schemas.read(run.times, schemas.TIMES) if run.times.exists() else {}
-    atomic.write_json(run.times, {**content, "ended": _now()})
+    began = read(run).began
+    atomic.write_json(run.times, ({"began": began.isoformat()} if began else {}) | {"ended": _now()})
 
 
 def _now() -> str:

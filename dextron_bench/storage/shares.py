@@ -17,8 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.storage import atomic, folder_config, hashing, provenance, schemas
+from msgspec import field
+
+from dextron_bench.storage import atomic, folder_config, hashing, provenance, records
 from dextron_bench.storage.folders import visible
+from dextron_bench.storage.provenance import Provenance
+from dextron_bench.storage.records import Record
 
 FOLDER = "pieces"
 CODE = "the benchmark's code"  # In a message.
@@ -69,13 +73,23 @@ class Share:
         return f"{self.index}/{self.of}"
 
 
+class Stamp(Record, frozen=True):
+    """What the stamp of a piece says: what the piece depends on, and its files with their SHA-256."""
+
+    name: str
+    depends_on: dict[str, Any] = field(name="depends on")
+    code: str
+    files: dict[str, str]
+    provenance: Provenance
+
+
 @dataclass(frozen=True, slots=True)
 class Piece:
     """A piece on the disk: its stamp, its files with their SHA-256, and the provenance of the process that made it."""
 
     stamp: Path
     files: Mapping[Path, str]
-    provenance: dict[str, Any]
+    provenance: Provenance
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,13 +113,9 @@ class Work:
 
         `config` is everything that the piece depends on besides the code; it contains the hash of the physics.
         """
-        stamp = {
-            "name": name,
-            "depends on": _with_simulator(config),
-            "code": self.code,
-            "files": {file.relative_to(self.folder).as_posix(): hashing.sha256(file) for file in files},
-            "provenance": provenance.collect(config["physics"]),
-        }
+        hashes = {file.relative_to(self.folder).as_posix(): hashing.sha256(file) for file in files}
+        made_by = provenance.collect(config["physics"])
+        stamp = Stamp(name, _with_simulator(config), self.code, hashes, made_by)
         atomic.write_json(file := self.file(name, ".json"), stamp)
         return file
 
@@ -116,19 +126,19 @@ class Work:
         """
         pieces: dict[str, Piece] = {}
         for file in visible(self.folder / FOLDER, "*.json"):
-            stamp = schemas.read(file, schemas.PIECE)
-            config = config_of(name := stamp["name"])
+            stamp = records.read(file, Stamp)
+            config = config_of(name := stamp.name)
             if config is None:
                 continue
             if name in pieces:
                 raise DoubledPiece(f"{pieces[name].stamp} and {file} are the same piece, {name}; remove one of them")
-            stored = {CODE: stamp["code"], **stamp["depends on"]}
+            stored = {CODE: stamp.code, **stamp.depends_on}
             expected = {CODE: self.code, **_with_simulator(config)}
             if differing := list(folder_config.differences(stored, expected)):
                 raise ForeignPiece(
                     f"{file} is a piece of other work: it differs in {' and '.join(differing)}; {REMEDY}"
                 )
-            pieces[name] = Piece(file, self._checked_files(file, stamp["files"]), stamp["provenance"])
+            pieces[name] = Piece(file, self._checked_files(file, stamp.files), stamp.provenance)
         return pieces
 
     def remove(self, pieces: Iterable[Piece]) -> None:
@@ -155,7 +165,7 @@ class Work:
 
 def _with_simulator(config: Mapping[str, Any]) -> dict[str, Any]:
     """A config as JSON has it, with the version of MuJoCo, on which the bits of episodes depend."""
-    return json.loads(json.dumps({**config, "mujoco": provenance.version_of("mujoco")}))
+    return json.loads(atomic.json_text({**config, "mujoco": provenance.version_of("mujoco")}))
 
 
 def check_complete(what: str, names: Sequence[str], present: Collection[str]) -> None:

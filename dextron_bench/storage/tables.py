@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench.storage import atomic, hashing
-from dextron_bench.storage.schemas import FULL_RETURN
+from dextron_bench.storage.records import FULL_RETURN
 
 DIGEST = "digest"  # In the attributes of a table, which pandas keeps in the file.
 

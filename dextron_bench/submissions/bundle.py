@@ -13,22 +13,22 @@ import stat
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from functools import cache
-from importlib.resources import files
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-import jsonschema
-from jsonschema.exceptions import best_match
+from msgspec import to_builtins
+from msgspec.structs import replace
 
 from dextron_bench.processes import limited_process
-from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage import atomic, hashing, records
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.printable import first_hidden
 from dextron_bench.storage.run_folder import RunFolder
+from dextron_bench.submissions.manifest import ClaimedResult, Manifest
 
-FORMAT = 1
+T = TypeVar("T", Manifest, ClaimedResult)
+KINDS: dict[type[Manifest] | type[ClaimedResult], str] = {Manifest: "bundle", ClaimedResult: "result"}
 MOST_SEEDS = 10
 MANIFEST = "bundle.json"
 AGENT = "agent"  # The folder of the agent's own files.
@@ -55,21 +55,21 @@ class BadBundle(ValueError):
     """A file that is not a complete bundle, or files that differ from its manifest."""
 
 
-def pack(folder: Path, entry: Mapping[str, Any], agent: Mapping[str, Path], file: Path) -> dict[str, Any]:
-    """Writes the runs `seed<k>` in a folder and an agent's own files, by name, as a bundle; returns its manifest.
+def pack(folder: Path, manifest: Manifest, agent: Mapping[str, Path], file: Path) -> Manifest:
+    """Writes the runs `seed<k>` in a folder and an agent's own files, by name, as a bundle.
 
-    `entry` is what the manifest says of the submission (see `Entry.manifest`).
+    Returns its manifest: the given one (see `Entry.manifest`) with the hashes of the files.
     """
-    run_files = [path for seed in entry["seeds"] for path in visible(RunFolder.of_seed(folder, seed).path, "**/*")]
+    run_files = [path for seed in manifest.seeds for path in visible(RunFolder.of_seed(folder, seed).path, "**/*")]
     members = {name: path for path in run_files if MEMBER.fullmatch(name := str(path.relative_to(folder)))}
     check_agent(agent)
     members |= {f"{AGENT}/{name}": path for name, path in agent.items()}
-    manifest = {"format": FORMAT, **entry, "files": {name: hashing.sha256(path) for name, path in members.items()}}
-    check(manifest, "bundle", file)
+    manifest = replace(manifest, files={name: hashing.sha256(path) for name, path in members.items()})
+    check(to_builtins(manifest), Manifest, file)
 
     def write(part: Path) -> None:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
-            text = json.dumps(manifest, indent=1, sort_keys=True) + "\n"
+            text = atomic.json_text(manifest, indent=1) + "\n"
             archive.writestr(_info(MANIFEST), text)
             for name, path in members.items():
                 with archive.open(_info(name), "w") as output, path.open("rb") as content:
@@ -80,7 +80,7 @@ def pack(folder: Path, entry: Mapping[str, Any], agent: Mapping[str, Path], file
     return manifest
 
 
-def unpack(file: Path, into: Path) -> dict[str, Any]:
+def unpack(file: Path, into: Path) -> Manifest:
     """Unpacks a bundle into an empty folder and returns its manifest; raises BadBundle, OSError.
 
     Writes nothing outside the folder. Checks names, sizes and hashes before it parses the content of any file.
@@ -91,9 +91,9 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
         _check_directory(file)
         with zipfile.ZipFile(file) as archive:
             members = _members(file, archive)
-            manifest = parse(_content(file, archive, members.get(MANIFEST)), "bundle", file)
-            _check_files(file, set(members) - {MANIFEST}, set(manifest["files"]))
-            for name, sha256 in manifest["files"].items():
+            manifest = parse(_content(file, archive, members.get(MANIFEST)), Manifest, file)
+            _check_files(file, set(members) - {MANIFEST}, set(manifest.files))
+            for name, sha256 in manifest.files.items():
                 if _extract(file, archive, members[name], into / name) != sha256:
                     raise BadBundle(f"{file}: {name} has another SHA-256 than the manifest lists")
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, UnicodeError) as error:
@@ -103,34 +103,36 @@ def unpack(file: Path, into: Path) -> dict[str, Any]:
     return manifest
 
 
-def parse(content: bytes, schema: str, file: Path) -> dict[str, Any]:
-    """The JSON value of a file of a stranger, after a separate process has checked it; raises BadBundle."""
+def parse(content: bytes, kind: type[T], file: Path) -> T:
+    """What a JSON file of a stranger holds, after a separate process has checked it; raises BadBundle."""
+    name = KINDS[kind]
     if len(content) > LARGEST_JSON:
-        raise BadBundle(f"{file}: the {schema} is larger than {LARGEST_JSON / 2**20:g} MiB")
-    done = limited_process.run(JSON_PROCESS, [schema, str(file)], content, MEMORY, SECONDS)
+        raise BadBundle(f"{file}: the {name} is larger than {LARGEST_JSON / 2**20:g} MiB")
+    done = limited_process.run(JSON_PROCESS, [name, str(file)], content, MEMORY, SECONDS)
     if done.code == 1 and done.output:
         raise BadBundle(ast.literal_eval(done.output.decode()))
     if done.code != 0:
-        raise BadBundle(f"{file}: the {schema} cannot be checked (the process that read it {done.ending})")
-    return json.loads(content)
+        raise BadBundle(f"{file}: the {name} cannot be checked (the process that read it {done.ending})")
+    return records.convert(json.loads(content), kind)
 
 
-def check(value: Any, schema: str, file: Path) -> None:
-    """Raises BadBundle if a JSON value does not follow a shipped schema, or holds text that cannot be printed."""
+def check(value: Any, kind: type[Manifest] | type[ClaimedResult], file: Path) -> None:
+    """Raises BadBundle if a JSON value is not of a kind, or holds text that cannot be printed."""
+    name = KINDS[kind]
     try:
         json.dumps(value, ensure_ascii=False, allow_nan=False).encode()
     except ValueError as error:
-        raise BadBundle(f"{file}: the {schema} has invalid text or numbers ({error})") from error
+        raise BadBundle(f"{file}: the {name} has invalid text or numbers ({error})") from error
     for text in _texts(value):
         if character := first_hidden(text):
-            raise BadBundle(f"{file}: the {schema} has invalid text: it has the character {character!r}")
-    error = best_match(_schema(schema).iter_errors(value))
-    if error:
-        place = "/".join(map(str, error.absolute_path)) or "an entry"
-        message = error.message if len(error.message) < 200 else f"{error.message[:200]}..."
-        raise BadBundle(f"{file}: {place} in the {schema} is invalid: {message}")
-    if schema == "bundle" and len(value["seeds"]) > MOST_SEEDS:
-        raise BadBundle(f"{file} has {len(value['seeds'])} seeds; a submission has at most {MOST_SEEDS}")
+            raise BadBundle(f"{file}: the {name} has invalid text: it has the character {character!r}")
+    try:
+        content = records.convert(value, kind)
+    except records.Mismatch as error:
+        message = error.why if len(error.why) < 200 else f"{error.why[:200]}..."
+        raise BadBundle(f"{file}: {error.place or 'an entry'} in the {name} is invalid: {message}") from None
+    if isinstance(content, Manifest) and len(content.seeds) > MOST_SEEDS:
+        raise BadBundle(f"{file} has {len(content.seeds)} seeds; a submission has at most {MOST_SEEDS}")
 
 
 def _texts(value: Any) -> Iterator[str]:
@@ -147,12 +149,6 @@ def check_agent(files: Mapping[str, Path]) -> None:
         _check_name(file, f"{AGENT}/{name}")
         if file.stat().st_size > LARGEST:
             raise BadBundle(f"{file} is larger than the {LARGEST / 2**20:.0f} MiB that a bundle accepts")
-
-
-@cache
-def _schema(name: str) -> jsonschema.Draft202012Validator:
-    text = files("dextron_bench.data").joinpath(f"{name}.schema.json").read_text(encoding="utf-8")
-    return jsonschema.Draft202012Validator(json.loads(text))
 
 
 def _check_directory(file: Path) -> None:

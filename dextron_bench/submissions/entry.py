@@ -7,14 +7,19 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.methods import registry
 from dextron_bench.methods.isolation.launch import Launch, prepare_launch
-from dextron_bench.submissions import bundle, names
-from dextron_bench.submissions.declaration import Declaration
+from dextron_bench.reaches.sources import RankedSource
+from dextron_bench.submissions import bundle, manifest, names
+from dextron_bench.submissions.manifest import Agent, AgentKind, Declared, Manifest
 from dextron_bench.world import model
 
 FOLDER = "submissions"  # In the folder of runs.
-MANIFEST_KINDS = {"method": "method", "module": "code", "file": "code", "policy": "policy", "command": "exec"}
+MANIFEST_KINDS: dict[str, AgentKind] = {
+    **{"method": "method", "module": "code", "file": "code"},
+    **{"policy": "policy", "command": "exec"},
+}
 
 
 class BadSubmission(ValueError):
@@ -48,7 +53,7 @@ class Entry:
 
     name: str
     spec: str
-    reaches: str
+    reaches: RankedSource
     seeds: tuple[int, ...]
     settings: dict[str, Any] = field(default_factory=dict)
     weights: Path | None = None
@@ -76,20 +81,20 @@ class Entry:
         """The folder with the runs of its seeds."""
         return runs / FOLDER / self.name / self.reaches
 
-    def manifest(self) -> dict[str, Any]:
-        """Its entries in the manifest of its bundle."""
+    def manifest(self) -> Manifest:
+        """The manifest of its bundle, without the files."""
         spec = self.launch.spec
         text = str(replace(spec, location=spec.file.name) if spec.file else spec)
-        agent: dict[str, Any] = {"kind": MANIFEST_KINDS[spec.kind], "spec": text, "settings": self.settings}
-        agent["weights"] = self.weights.name if self.weights else ""
-        return {
-            "name": self.name,
-            "reaches": self.reaches,
-            "seeds": list(self.seeds),
-            "agent": agent,
-            "declared": asdict(self.declared),
-            "physics": model.mjcf_hash(),
-        }
+        return Manifest(
+            format=manifest.FORMAT,
+            name=self.name,
+            reaches=self.reaches,
+            seeds=list(self.seeds),
+            agent=Agent(MANIFEST_KINDS[spec.kind], text, self.settings, self.weights.name if self.weights else ""),
+            declared=Declared(**asdict(self.declared)),
+            physics=model.mjcf_hash(),
+            files={},
+        )
 
     def files(self) -> dict[str, Path]:
         """The agent's own files, by name; with them it can run again."""

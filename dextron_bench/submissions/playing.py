@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import to_builtins
 
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent, Limits
@@ -21,6 +22,7 @@ from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle
 from dextron_bench.submissions.entry import Entry
+from dextron_bench.submissions.manifest import Manifest
 
 
 def play_entry(
@@ -45,7 +47,7 @@ def prepare_all(entry: Entry, runs: Path, record: int, limits: Limits, threads: 
     A piece of an evaluation is a whole split, since its rows are shuffled. Raises BadBundle if a bundle could not hold
     the entry, FolderMismatch, MissingData.
     """
-    bundle.check({"format": bundle.FORMAT, **entry.manifest(), "files": {}}, "bundle", entry.folder(runs))
+    bundle.check(to_builtins(entry.manifest()), Manifest, entry.folder(runs))
     bundle.check_agent(entry.files())
     source = sources.open_source(entry.reaches)
     return [
@@ -88,7 +90,7 @@ def row_order(split: Split, seed: int) -> np.ndarray:
     return np.random.default_rng(int(digest, 16)).permutation(len(split))
 
 
-def write_bundle(entry: Entry, folder: Path, file: Path) -> dict[str, Any]:
+def write_bundle(entry: Entry, folder: Path, file: Path) -> Manifest:
     """Writes the bundle of an entry whose runs are complete; returns its manifest."""
     return bundle.pack(folder, entry.manifest(), entry.files(), file)
 
@@ -97,6 +99,5 @@ def _config(entry: Entry, seed: int) -> dict[str, Any]:
     """What the run of a seed depends on."""
     manifest = entry.manifest()
     hashes = {name: hashing.sha256(file) for name, file in entry.files().items()}
-    return {name: manifest[name] for name in ("agent", "reaches", "physics")} | {
-        "method": entry.name, "seed": seed, "files": hashes
-    }  # fmt: skip
+    depends = {"agent": to_builtins(manifest.agent), "reaches": manifest.reaches, "physics": manifest.physics}
+    return depends | {"method": entry.name, "seed": seed, "files": hashes}

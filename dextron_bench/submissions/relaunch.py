@@ -3,33 +3,32 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.methods import registry, specs
 from dextron_bench.methods.isolation.launch import Launch, prepare_launch
 from dextron_bench.methods.specs import AgentSpec
 from dextron_bench.submissions import bundle
 from dextron_bench.submissions.entry import MANIFEST_KINDS
+from dextron_bench.submissions.manifest import Agent
 
 LOCATION = re.compile(r"[A-Za-z0-9][\w.+-]*", re.ASCII)  # A file of the bundle, without folders, or a module.
 CLASS = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
-def launch_of(agent: Mapping[str, Any], files: Path, trust: bool = False) -> Launch:
+def launch_of(agent: Agent, files: Path, trust: bool = False) -> Launch:
     """How to start the agent that a manifest describes, from the folder of its files; raises BadBundle, AgentError.
 
     Without `trust` it starts in the sandbox only.
     """
-    if agent["kind"] == "exec":
+    if agent.kind == "exec":
         raise bundle.BadBundle("a bundle does not contain the program of an `exec:` agent, so it cannot run again")
-    spec = _checked_spec(agent["kind"], agent["spec"])
-    weights = _agent_file(files, agent["weights"]) if agent["weights"] else None
+    spec = _checked_spec(agent.kind, agent.spec)
+    weights = _agent_file(files, agent.weights) if agent.weights else None
     if spec.file:
         spec = replace(spec, location=str(_agent_file(files, spec.location)))
-    return replace(prepare_launch(str(spec), agent["settings"], weights), trusted=trust)
+    return replace(prepare_launch(str(spec), agent.settings, weights), trusted=trust)
 
 
 def _checked_spec(kind: str, text: str) -> AgentSpec:

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from msgspec import structs
+from msgspec.structs import replace
 
 from dextron_bench.evaluation import episode_table
+from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.evaluation.episodes import Episode, fingerprint
+from dextron_bench.evaluation.results import Replay, Result, scores_by_split
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.reaches import sources
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, records
 from dextron_bench.storage.progress import Progress
+from dextron_bench.storage.provenance import Provenance
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle, episode_tables, playing, relaunch, replay_check
+from dextron_bench.submissions.manifest import ClaimedResult, Manifest
 from dextron_bench.submissions.recording_check import RecordingCheck
 from dextron_bench.submissions.result_check import differences, distant_returns, same_platform
 from dextron_bench.submissions.verdict import SeedFinding
@@ -38,7 +44,7 @@ class Playing:
 class SeedCheck:
     """The checks of one seed of an unpacked bundle; `rerun` needs a `check` before it."""
 
-    def __init__(self, folder: Path, manifest: Mapping[str, Any], seed: int, splits: Sequence[Split]) -> None:
+    def __init__(self, folder: Path, manifest: Manifest, seed: int, splits: Sequence[Split]) -> None:
         self._run, self._agent_files = RunFolder.of_seed(folder, seed), folder / bundle.AGENT
         self._manifest, self._seed, self._splits = manifest, seed, splits
         self._traces: dict[tuple[str, int], str] = {}  # The hash of each replayed episode.
@@ -47,22 +53,23 @@ class SeedCheck:
         """Checks rows, replays their actions, and compares result and recordings with the replay."""
         finding = SeedFinding(self._seed)
         try:
-            table, result = self._read()
+            table, result, made_by = self._read()
         except (bundle.BadBundle, atomic.DamagedFile) as error:
             finding.add(str(error))
             return finding
         if faults := list(episode_tables.faults(table, self._splits)):
             finding.add(*faults)
             return finding
-        lenient = not same_platform(result["provenance"])
+        lenient = not same_platform(result.provenance)
         tolerance = replay_check.TOLERANCE if lenient else 0.0
         recordings = RecordingCheck(self._run, self._claims(), tolerance, report)
         replayed = self._replay(table, recordings, threads, report)
         for problem in recordings.problems:
             finding.add(problem)
         finding.episodes, finding.exact, finding.table = replayed.episodes, replayed.exact, replayed.rows
-        finding.result = self._result(replayed, result["provenance"])
-        finding.add(*self._provenance_faults(result))
+        finding.result = self._result(replayed, result.provenance)
+        if result.provenance != made_by:
+            finding.add("its result has another provenance than its run")
         self._compare(finding, replayed, result, table if lenient else None)
         for name in recordings.without_row(self._traces):
             finding.add(f"recordings/{name} belongs to no row of the splits")
@@ -71,10 +78,10 @@ class SeedCheck:
     def rerun(self, how: Playing) -> SeedFinding:
         """Runs the agent again and compares its episodes with the replayed ones."""
         finding, differing = SeedFinding(self._seed), []
-        source = sources.open_source(self._manifest["reaches"])
+        source = sources.open_source(self._manifest.reaches)
         total, done = sum(len(split) for split in self._splits), 0
         try:
-            launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, how.trust)
+            launch = relaunch.launch_of(self._manifest.agent, self._agent_files, how.trust)
             for split in self._splits:
                 for row, episode in playing.play_shuffled(launch, source, split, self._seed, how.limits, how.threads):
                     done += 1
@@ -88,8 +95,8 @@ class SeedCheck:
 
     def play_fresh(self, splits: Sequence[Split], how: Playing) -> pd.DataFrame:
         """The table of the agent's episodes on fresh settings; raises AgentError, BadBundle."""
-        source, rows = sources.open_source(self._manifest["reaches"]), []
-        launch = relaunch.launch_of(self._manifest["agent"], self._agent_files, how.trust)
+        source, rows = sources.open_source(self._manifest.reaches), []
+        launch = relaunch.launch_of(self._manifest.agent, self._agent_files, how.trust)
         total = sum(len(split) for split in splits)
         for split in splits:
             for row, episode in playing.play_shuffled(launch, source, split, self._seed, how.limits, how.threads):
@@ -98,20 +105,20 @@ class SeedCheck:
                 how.report(len(rows), total, f"seed {self._seed}, fresh settings")
         return pd.DataFrame(rows).sort_values(["split", "row"], ignore_index=True)
 
-    def _read(self) -> tuple[pd.DataFrame, dict[str, Any]]:
-        """The table of episodes and the result; raises BadBundle, DamagedFile."""
+    def _read(self) -> tuple[pd.DataFrame, Result, Provenance]:
+        """The table of episodes, the result and the provenance of the run; raises BadBundle, DamagedFile."""
         for file in (self._run.episodes, self._run.result, self._run.provenance):
             if not file.exists():
                 raise bundle.BadBundle(f"lacks {file.name}")
             if file.suffix == ".json" and file.stat().st_size > bundle.LARGEST_JSON:
                 raise bundle.BadBundle(f"has a {file.name} of more than {bundle.LARGEST_JSON / 2**20:g} MiB")
         table = episode_tables.read(self._run.episodes, self._splits)
-        bundle.parse(self._run.result.read_bytes(), "result", self._run.result)
-        return table, result_files.read_result(self._run.result)
+        bundle.parse(self._run.result.read_bytes(), ClaimedResult, self._run.result)
+        return table, result_files.read_result(self._run.result), records.read(self._run.provenance, Provenance)
 
     def _claims(self) -> dict[str, Any]:
         """Method, source of reaches and seed, as the manifest has them."""
-        return {"method": self._manifest["name"], "reaches": self._manifest["reaches"], "seed": self._seed}
+        return {"method": self._manifest.name, "reaches": self._manifest.reaches, "seed": self._seed}
 
     def _replay(
         self, table: pd.DataFrame, recordings: RecordingCheck, threads: int, report: Progress
@@ -126,28 +133,24 @@ class SeedCheck:
         def replaying(done: int, total: int, note: str = "") -> None:
             report(done, total, f"seed {self._seed}, replaying")
 
-        source = sources.open_source(self._manifest["reaches"])
+        source = sources.open_source(self._manifest.reaches)
         return replay_check.replay_table(source, self._splits, table, threads, replaying, observe)
 
-    def _result(self, replayed: replay_check.Replayed, provenance: dict[str, Any]) -> dict[str, Any]:
+    def _result(self, replayed: replay_check.Replayed, made_by: Provenance) -> Result:
         """The result computed from the episodes as they were played again, and how many of them are equal."""
-        return {
+        return Result(
             **self._claims(),
-            "splits": result_files.scores_by_split(replayed.rows),
-            "provenance": provenance,
-            "declared": self._manifest["declared"],
-            "replay": {"episodes": replayed.episodes, "equal": replayed.exact},
-        }
-
-    def _provenance_faults(self, result: Mapping[str, Any]) -> Iterator[str]:
-        if result["provenance"] != atomic.read_json(self._run.provenance):
-            yield "its result has another provenance than its run"
+            splits=scores_by_split(replayed.rows),
+            provenance=made_by,
+            declared=Declaration(**structs.asdict(self._manifest.declared)),
+            replay=Replay(replayed.episodes, replayed.exact),
+        )
 
     def _compare(
         self,
         finding: SeedFinding,
         replayed: replay_check.Replayed,
-        result: dict[str, Any],
+        result: Result,
         foreign: pd.DataFrame | None,
     ) -> None:
         """Adds how the result and the rows differ from the replay.
@@ -161,8 +164,8 @@ class SeedCheck:
         elif foreign is None or replayed.alike < replay_check.AGREEING * replayed.episodes:
             finding.add(*replayed.differing)
         else:
-            claimed = result_files.scores_by_split(foreign.sort_values(["split", "row"]))
-            finding.add(*differences(result, {**finding.result, "splits": claimed}))
+            claimed = scores_by_split(foreign.sort_values(["split", "row"]))
+            finding.add(*differences(result, replace(finding.result, splits=claimed)))
             finding.add(*distant_returns(result, finding.result))
             finding.notes.append(
                 f"seed{self._seed}: made on another platform; of {replayed.episodes} episodes {replayed.exact} are "

@@ -28,12 +28,12 @@ def unpack_for_viewing(file: Path, runs: Path) -> Path:
     with TemporaryDirectory(prefix=".unpacking-", dir=place.parent) as folder:
         part = Path(folder) / "bundle"
         manifest = bundle.unpack(file, part)
-        for table in (RunFolder.of_seed(part, seed).episodes for seed in manifest["seeds"]):
+        for table in (RunFolder.of_seed(part, seed).episodes for seed in manifest.seeds):
             if not table.exists():
                 raise bundle.BadBundle(
                     f"{file} lacks {table.relative_to(part)}; make it again with `dextron-bench submit`"
                 )
-        splits = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
+        splits = [load_split(manifest.reaches, name) for name in ranking_splits(manifest.reaches)]
         for run in seed_folders(part):
             for fault in episode_tables.faults(episode_tables.read(run.episodes, splits), splits):
                 raise bundle.BadBundle(f"{file}: {run.path.name}: {fault}")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import pandas as pd
+
+from dextron_bench.evaluation.results import Result
+from dextron_bench.submissions.manifest import Manifest
 
 SHOWN = 5  # Problems of one kind that are listed one by one.
 
@@ -23,7 +25,7 @@ class SeedFinding:
     notes: list[str] = field(default_factory=list)
     episodes: int = 0
     exact: int = 0
-    result: dict[str, Any] | None = None
+    result: Result | None = None
     table: pd.DataFrame | None = None
 
     def add(self, *problems: str) -> None:
@@ -40,13 +42,13 @@ class Verdict:
     `tables` are the episodes as they were played again, and `fresh` the episodes on fresh settings.
     """
 
-    manifest: dict[str, Any]
+    manifest: Manifest
     tier: str = "replayed"
     episodes: int = 0
     exact: int = 0
     problems: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    results: dict[int, dict[str, Any]] = field(default_factory=dict)
+    results: dict[int, Result] = field(default_factory=dict)
     tables: dict[int, pd.DataFrame] = field(default_factory=dict)
     fresh: dict[int, pd.DataFrame] = field(default_factory=dict)
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+
+from msgspec.structs import replace
 
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import sandbox
@@ -18,6 +19,7 @@ from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import seed_folders
 from dextron_bench.submissions import bundle, duplicates
+from dextron_bench.submissions.manifest import Manifest
 from dextron_bench.submissions.seed_check import Playing, SeedCheck
 from dextron_bench.submissions.verdict import Verdict
 from dextron_bench.world import model
@@ -25,7 +27,7 @@ from dextron_bench.world import model
 
 def verify(
     folder: Path,
-    manifest: dict[str, Any],
+    manifest: Manifest,
     board: Path | None = None,
     rerun: bool = False,
     threads: int = 0,
@@ -39,13 +41,13 @@ def verify(
     With `rerun` the agent also runs again, from the files in the bundle, and in the sandbox only unless `trust` is
     True; then it also plays `fresh` settings, if they are given. Raises MissingData, OSError.
     """
-    verdict, numbers = Verdict(manifest), manifest["seeds"]
-    if manifest["physics"] != model.mjcf_hash():
+    verdict, numbers = Verdict(manifest), manifest.seeds
+    if manifest.physics != model.mjcf_hash():
         verdict.problems.append("was played with other physics than this version's; submit it again with this version")
         return verdict
     if sorted(numbers) != list(range(len(numbers))):
         verdict.problems.append(f"has seeds {numbers}; they must be 0, 1, 2 and so on, none chosen")
-    splits = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
+    splits = [load_split(manifest.reaches, name) for name in ranking_splits(manifest.reaches)]
     seeds = [SeedCheck(folder, manifest, seed, splits) for seed in numbers]
     for seed in seeds:
         verdict.add(seed.check(threads, report))
@@ -65,7 +67,7 @@ def _check_copies(verdict: Verdict, board: Path | None) -> None:
     if len(verdict.results) > 1 and duplicates.all_equal(verdict.results):
         verdict.notes.append("all seeds have the same episodes: they count as one, not as several trainings")
     if board is not None and verdict.passed:
-        copies = list(duplicates.copied_seeds(verdict.results, verdict.manifest["name"], board))
+        copies = list(duplicates.copied_seeds(verdict.results, verdict.manifest.name, board))
         (verdict.notes if verdict.tier == "re-run" else verdict.problems).extend(copies)
 
 
@@ -86,12 +88,12 @@ def _rerun(folder: Path, seeds: Sequence[SeedCheck], verdict: Verdict, how: Play
 
 def _play_fresh(fresh: FreshSettings, seeds: Sequence[SeedCheck], verdict: Verdict, how: Playing) -> None:
     """Lets the agent of each seed play fresh settings, and adds their scores to the results."""
-    splits = fresh.draw(verdict.manifest["reaches"], how.threads, how.report)
-    for seed, result in zip(seeds, verdict.results.values(), strict=True):
+    splits = fresh.draw(verdict.manifest.reaches, how.threads, how.report)
+    for seed, (number, result) in zip(seeds, list(verdict.results.items()), strict=True):
         try:
             table = seed.play_fresh(splits, how)
         except (AgentError, bundle.BadBundle) as error:
             verdict.problems.append(f"on fresh settings: {error}")
             return
-        verdict.fresh[result["seed"]] = table
-        result["fresh"] = fresh.scores(table)
+        verdict.fresh[number] = table
+        verdict.results[number] = replace(result, fresh=fresh.scores(table))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.storage import schemas, tensors
+from dextron_bench.storage import records, tensors
 from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
@@ -111,13 +111,17 @@ def open_block(file: Path) -> dict[str, np.ndarray]:
     return arrays
 
 
-def read_config(folder: Path) -> dict[str, Any]:
-    """Config of the data set in a folder, and hash of its physics; empty if the folder has no config.
+class DatasetConfig(records.Record, frozen=True):
+    """What a data set was made with, and the hash of its physics."""
 
-    Raises DamagedFile.
-    """
+    search: dict[str, Any]
+    physics: str
+
+
+def read_config(folder: Path) -> DatasetConfig | None:
+    """Config of the data set in a folder; None if the folder has no config. Raises DamagedFile."""
     file = folder / CONFIG
-    return schemas.read(file, schemas.SEARCH) if file.exists() else {}
+    return records.read(file, DatasetConfig) if file.exists() else None
 
 
 def _damaged(file: Path, fault: str) -> BadDataset:

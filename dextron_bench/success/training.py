@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import torch
+from msgspec import Meta, to_builtins
 from torch import Tensor, nn
 
-from dextron_bench.storage import schemas, tensors
+from dextron_bench.storage import records, tensors
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.progress import Progress, no_progress
+from dextron_bench.storage.records import Count, Number, Record
 from dextron_bench.success.dataset import Dataset, read_config
 from dextron_bench.success.network import CLIP, SIZES, SuccessModel
 
@@ -86,13 +88,33 @@ def initial_network(rng: np.random.Generator) -> nn.Sequential:
     return network
 
 
+class FitPoint(Record, frozen=True):
+    """Loss and accuracy after an epoch, on learned and on held-out settings."""
+
+    epoch: Count
+    loss: Number
+    accuracy: Number
+    test_loss: Number
+    test_accuracy: Number
+
+
+class Fit(Record, frozen=True):
+    """What the file of an unfinished training says of it: its settings, rows of data, and learning curve."""
+
+    fit: dict[str, Any]
+    rows: Count
+    epoch: Count
+    curve: Annotated[list[FitPoint], Meta(min_length=1)]
+    best_epoch: Count
+
+
 class _TrainingRun:
     """State of a training between two epochs."""
 
     def __init__(self, folder: Path, config: TrainingConfig) -> None:
         self._folder, self._config = folder, config
         self._data, self._test_data = Dataset(folder), Dataset(folder, test=True)
-        self.epoch, self.curve, self.best = 0, list[dict[str, float]](), dict[str, np.ndarray]()
+        self.epoch, self.curve, self.best = 0, list[FitPoint](), dict[str, np.ndarray]()
         states, _, _ = self._data.take(self._rng(1).integers(len(self._data), size=SCALE_ROWS))
         self._mean = states.mean(axis=0, dtype=np.float64)
         self._deviation = np.sqrt(states.var(axis=0, dtype=np.float64) + 1e-8)
@@ -118,17 +140,17 @@ class _TrainingRun:
             sums += loss.item(), (logits.argmax(dim=1) == labels).double().mean().item()
         self.epoch += 1
         loss, accuracy = sums / config.updates
-        self.curve.append({"epoch": self.epoch, "loss": loss, "accuracy": accuracy} | self._test())
+        self.curve.append(FitPoint(self.epoch, float(loss), float(accuracy), *self._test()))
         if self.best_epoch == self.epoch:
             self.best = self.arrays()
 
-    def _test(self) -> dict[str, float]:
+    def _test(self) -> tuple[float, float]:
         """Loss and accuracy on held-out settings."""
         states, actions, outcomes = self._test_data.take(self._rng(3).integers(len(self._test_data), size=TEST_ROWS))
         with torch.inference_mode():
             logits, labels = self._network(self._inputs(states, actions)), torch.tensor(outcomes)
             accuracy = (logits.argmax(dim=1) == labels).double().mean().item()
-            return {"test_loss": self._loss(logits, labels).item(), "test_accuracy": accuracy}
+            return self._loss(logits, labels).item(), accuracy
 
     def _inputs(self, states: np.ndarray, actions: np.ndarray) -> Tensor:
         """Inputs (B, 49) of the network for states (B, 48) and actions (B,)."""
@@ -138,16 +160,16 @@ class _TrainingRun:
     @property
     def best_epoch(self) -> int:
         """The epoch with the lowest loss on held-out settings so far."""
-        return int(min(self.curve, key=lambda point: point["test_loss"])["epoch"])
+        return min(self.curve, key=lambda point: point.test_loss).epoch
 
     def note(self) -> str:
         """A note on the progress: the last accuracy on held-out settings."""
-        return f"held-out accuracy {100 * self.curve[-1]['test_accuracy']:.1f} %" if self.curve else ""
+        return f"held-out accuracy {100 * self.curve[-1].test_accuracy:.1f} %" if self.curve else ""
 
     def about(self) -> dict[str, Any]:
         """How the model was trained, for the header of its file."""
-        about = {"fit": asdict(self._config), "rows": len(self._data), "epoch": self.epoch, "curve": self.curve}
-        return about | {"best_epoch": self.best_epoch, "data": read_config(self._folder)}
+        fit = Fit(asdict(self._config), len(self._data), self.epoch, self.curve, self.best_epoch)
+        return to_builtins(fit) | {"data": to_builtins(read_config(self._folder)) or {}}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Copies of the arrays of a SuccessModel."""
@@ -164,16 +186,16 @@ class _TrainingRun:
 
     def resume(self, file: Path) -> None:
         """Restores the training that wrote a file; raises FolderMismatch, BadTensors."""
-        about, arrays = schemas.read_about(file, schemas.FIT), tensors.read(file)
+        about, arrays = records.read_about(file, Fit), tensors.read(file)
         expected = {"fit": asdict(self._config), "rows": len(self._data)}
-        stored = {**about.get("fit", {}), "epochs": self._config.epochs}  # A training with fewer epochs may continue.
-        if {"fit": stored, "rows": about.get("rows")} != expected or about["epoch"] > self._config.epochs:
+        stored = {**about.fit, "epochs": self._config.epochs}  # A training with fewer epochs may continue.
+        if {"fit": stored, "rows": about.rows} != expected or about.epoch > self._config.epochs:
             raise FolderMismatch(
                 f"{self._folder} holds another training; remove {file.name} there, or train with its settings"
             )
-        if len(about["curve"]) != about["epoch"]:
+        if len(about.curve) != about.epoch:
             raise tensors.OtherTensors(file, "its curve does not have a point for each epoch")
-        self.epoch, self.curve = about["epoch"], about["curve"]
+        self.epoch, self.curve = about.epoch, list(about.curve)
         expected_names = {*self.arrays(), *(f"best.{name}" for name in self.arrays()), *self._adam_names()}
         if lacking := sorted(expected_names - arrays.keys()):
             raise tensors.OtherTensors(file, f"it is not an unfinished training: it lacks {lacking[0]!r}")

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from msgspec import field
 
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods.learners import PolicyTransfer
@@ -20,7 +22,8 @@ from dextron_bench.runs.plans import Plan, Run, resolve
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import Split, load_split
 from dextron_bench.splits.rows import Rows
-from dextron_bench.storage import atomic, hashing, schemas
+from dextron_bench.storage import atomic, hashing, records
+from dextron_bench.storage.records import Count, Record, Scores
 from dextron_bench.storage.run_folder import RunFolder, runs_without
 from dextron_bench.sweeps.execution import Resources
 from dextron_bench.training.jobs import TrainingJob
@@ -41,6 +44,14 @@ class LeftOut:
     failed: int
 
 
+class LeftOutScores(Record, frozen=True):
+    """The file of a seed: its scores on the settings of a subject, and what they depend on."""
+
+    depends_on: dict[str, Any] = field(name="depends on")
+    scores: Scores
+    failed: Count
+
+
 def cross_validate(plan: Plan, seeds: Sequence[int], resources: Resources) -> Iterator[LeftOut]:
     """The scores of a method on each subject of `train`, sorted; what the folder of runs holds is not made again.
 
@@ -59,8 +70,8 @@ def cross_validate(plan: Plan, seeds: Sequence[int], resources: Resources) -> It
                 job.run(seeds, report)
             held_out, _ = strata.by_subject(split, subject)
             entries = [_scores(run.with_seed(seed), subject, held_out, job, resources) for seed in seeds]
-        scores = np.array([entry["scores"] for entry in entries], float)
-        yield LeftOut(subject, scores, sum(entry["failed"] for entry in entries))
+        scores = np.array([entry.scores for entry in entries], float)
+        yield LeftOut(subject, scores, sum(entry.failed for entry in entries))
 
 
 def _checked(run: Run) -> Run:
@@ -73,20 +84,20 @@ def _checked(run: Run) -> Run:
     return run
 
 
-def _scores(run: Run, subject: str, held_out: Split, job: TrainingJob | None, resources: Resources) -> dict:
+def _scores(run: Run, subject: str, held_out: Split, job: TrainingJob | None, resources: Resources) -> LeftOutScores:
     """What the file of a seed holds: the scores on a subject's settings, played if the file is missing or stale."""
     folder = RunFolder.of(runs_without(resources.runs, subject), run.label, run.source, run.seed)
     weights = job.run_folder(run.seed).weights if job else None
     depends = {**run.config(), "rows": held_out.digest, "weights": hashing.sha256(weights) if weights else None}
     if folder.left_out.exists():
-        stored = schemas.read(folder.left_out, schemas.LEFT_OUT)
-        if stored["depends on"] == depends:
+        stored = records.read(folder.left_out, LeftOutScores)
+        if stored.depends_on == depends:
             return stored
     rows = _once(held_out)
     source, agent = sources.open_source(run.source), execution.agent(run, weights)
     episodes = dict(rollout(agent, source, rows, threads=resources.threads))
     failed = sum(bool(episode.failure) for episode in episodes.values())
-    content = {"depends on": depends, "scores": [episodes[row].score for row in range(len(rows))], "failed": failed}
+    content = LeftOutScores(depends, [episodes[row].score for row in range(len(rows))], failed)
     atomic.write_json(folder.left_out, content)
     return content
 

@@ -15,13 +15,14 @@ from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.runs import annotations, execution, result_files
 from dextron_bench.runs.plans import Run, beside_other_code, resolve
 from dextron_bench.scores import statistics
-from dextron_bench.storage import folders, schemas
+from dextron_bench.storage import folders
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.sweeps import optuna_search, space
 from dextron_bench.sweeps.sweep import VAL, Sweep, SweepFile
 from dextron_bench.sweeps.trial import DONE, ENDED, FAILED, STOPPED, Trial
-from dextron_bench.training import jobs, loop
+from dextron_bench.training import jobs, learning_curve, loop
 from dextron_bench.training.checkpoints import Busy
+from dextron_bench.training.learning_curve import CurvePoint
 from dextron_bench.world import task
 
 NOT_OF_A_TRIAL = (OSError, MemoryError, Busy, MissingData, jobs.NoDevice, optuna_search.MissingOptuna)
@@ -115,32 +116,32 @@ class _Attempt:
                 return replace(trial, state=STOPPED, points=self._points)
             for run in group:
                 execution.execute(run, resources.runs, resources.threads, report)
-        results = [result_files.read_result(run.folder(resources.runs).result)["splits"][VAL] for run in group]
-        scores = np.array([result["scores"] for result in results], float)
+        results = [result_files.read_result(run.folder(resources.runs).result).splits[VAL] for run in group]
+        scores = np.array([result.scores for result in results], float)
         return replace(
             trial,
             state=DONE,
             returns=statistics.estimate(scores),
             successes=statistics.estimate((scores == task.SUCCESS).astype(float), statistics.SHARES),
-            failed=sum(result["failed"] for result in results),
+            failed=sum(result.failed for result in results),
             points=_mean_curve(self._curves(group)),
         )
 
     def _watch(self) -> loop.Watch:
         """What stops a training whose learning curve is below the median of the earlier trials."""
 
-        def watch(curves: dict[int, list[dict[str, Any]]]) -> None:
+        def watch(curves: dict[int, list[CurvePoint]]) -> None:
             self._points = _mean_curve(list(curves.values()))
             if optuna_search.should_stop(self._points, self._earlier):
                 raise loop.StoppedEarly
 
         return watch if self._sweep.prune else loop.no_watch
 
-    def _curves(self, group: Sequence[Run]) -> list[list[dict[str, Any]]]:
+    def _curves(self, group: Sequence[Run]) -> list[list[CurvePoint]]:
         """The learning curves of a method that trains; none for another."""
         job = group[0].training_job(self._resources.runs)
         files = [job.run_folder(run.seed).curve for run in group] if job else []
-        return [schemas.read(file, schemas.CURVE)["points"] for file in files]
+        return [learning_curve.read(file) for file in files]
 
     def _mark(self, run: Run) -> None:
         """Tags the run with the name of the sweep."""
@@ -159,10 +160,10 @@ def _run_name(sweep: Sweep, settings: Mapping[str, Any], runs: Path) -> str:
     return f"{run.label}/{run.source}"
 
 
-def _mean_curve(curves: Sequence[Sequence[Mapping[str, Any]]]) -> dict[int, float]:
+def _mean_curve(curves: Sequence[Sequence[CurvePoint]]) -> dict[int, float]:
     """The mean return of all seeds at each epoch."""
     by_epoch: dict[int, list[float]] = {}
     for points in curves:
         for point in points:
-            by_epoch.setdefault(point["epoch"], []).append(point["return"])
+            by_epoch.setdefault(point.epoch, []).append(point.mean)
     return {epoch: float(np.mean(values)) for epoch, values in by_epoch.items()}

@@ -13,11 +13,12 @@ import numpy as np
 from dextron_bench.methods import registry
 from dextron_bench.runs.plans import Plan, resolve
 from dextron_bench.splits.loading import load_split
-from dextron_bench.storage import atomic, folder_config, hashing, schemas
+from dextron_bench.storage import atomic, folder_config, hashing, records
 from dextron_bench.storage.folders import visible
+from dextron_bench.storage.records import Count, Record
 from dextron_bench.sweeps import optuna_search, space
 from dextron_bench.sweeps.space import Choices, Space
-from dextron_bench.sweeps.trial import Trial, best
+from dextron_bench.sweeps.trial import Trial, TrialRecord, best
 
 FOLDER, FILE = "sweeps", "sweep.json"  # In the folder of runs: sweeps/<name>/sweep.json.
 VAL = "val"
@@ -88,6 +89,24 @@ def default_name(sweep: Sweep) -> str:
     return f"{question['method']}-{hashing.digest(json.dumps(question, sort_keys=True).encode())[:8]}"
 
 
+class Winner(Record, frozen=True):
+    """The trial that won, by its number, its run, and the split on which it won."""
+
+    trial: Count
+    run: str
+    split: str
+
+
+class SweepContent(Record, frozen=True):
+    """The content of the file of a sweep; `flags` of `run` are the method and the settings that do not vary."""
+
+    question: dict[str, Any]
+    trials: list[TrialRecord]
+    winner: Winner | None
+    choice: str
+    flags: str
+
+
 @dataclass(frozen=True)
 class SweepFile:
     """The file of a sweep."""
@@ -106,30 +125,30 @@ class SweepFile:
         """The name of the sweep."""
         return self.path.parent.name
 
-    def read(self) -> dict[str, Any]:
+    def read(self) -> SweepContent:
         """Its content; raises BadSweep if there is none, DamagedFile."""
         if not self.path.exists():
             names = ", ".join(file.name for file in sweep_files(self.path.parents[2])) or "none"
             raise BadSweep(f"no sweep is called {self.name!r}; the folder has {names}")
-        return schemas.read(self.path, schemas.SWEEP)
+        return records.read(self.path, SweepContent)
 
     def begin(self, question: Mapping[str, Any]) -> list[Trial]:
         """The trials so far, none for a new sweep; raises BadSweep if the file has another question."""
         if not self.path.exists():
             return []
         content = self.read()
-        if names := list(folder_config.differences(content["question"], question)):
+        if names := list(folder_config.differences(content.question, question)):
             raise BadSweep(
                 f"{self.path.parent} holds another sweep: it differs in {' and '.join(names)}; give another --name"
             )
-        return [Trial.from_json(trial) for trial in content["trials"]]
+        return [Trial.of(trial) for trial in content.trials]
 
     def write(self, question: Mapping[str, Any], trials: list[Trial], flags: str) -> None:
         """Replaces the content; `flags` of `run` are the method and the settings that do not vary."""
         number = best(trials)
-        winner = None if number is None else {"trial": number, "run": trials[number].run, "split": VAL}
-        content = {"question": dict(question), "trials": [trial.as_json() for trial in trials], "flags": flags}
-        atomic.write_json(self.path, content | {"winner": winner, "choice": CHOICE})
+        winner = None if number is None else Winner(number, trials[number].run, VAL)
+        trial_records = [trial.as_record() for trial in trials]
+        atomic.write_json(self.path, SweepContent(dict(question), trial_records, winner, CHOICE, flags))
 
 
 def sweep_files(runs: Path) -> Iterator[SweepFile]:

@@ -3,13 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
+import msgspec
+
 from dextron_bench.scores.statistics import Estimate
+from dextron_bench.storage.records import Count, Record, Return
 
 STARTED, DONE, STOPPED, FAILED = "started", "done", "stopped early", "failed"
 ENDED = (DONE, STOPPED)  # States that a sweep leaves as they are; a failed trial is tried again.
+
+
+class TrialScores(Record, frozen=True):
+    """The part of a trial's record about `val`: its estimates, and how many episodes failed."""
+
+    failed: Count
+    returns: Estimate | None = msgspec.field(name="return", default=None)
+    successes: Estimate | None = msgspec.field(name="success", default=None)
+
+
+class TrialPoint(Record, frozen=True):
+    """The mean return of all seeds at an epoch."""
+
+    epoch: Count
+    mean: Return = msgspec.field(name="return")
+
+
+class TrialRecord(Record, frozen=True):
+    """A trial in the file of a sweep."""
+
+    settings: dict[str, Any]
+    run: str
+    state: str
+    error: str
+    val: TrialScores
+    points: list[TrialPoint]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,23 +64,18 @@ class Trial:
         """Mean return on `val`; NaN for a trial that is not done."""
         return self.returns.mean if self.returns else float("nan")
 
-    def as_json(self) -> dict[str, Any]:
-        """The trial as plain values."""
-        estimates = {"return": self.returns, "success": self.successes}
-        return {
-            **{"settings": dict(self.settings), "run": self.run, "state": self.state, "error": self.error},
-            "val": {name: asdict(value) for name, value in estimates.items() if value} | {"failed": self.failed},
-            "points": [{"epoch": epoch, "return": value} for epoch, value in sorted(self.points.items())],
-        }
+    def as_record(self) -> TrialRecord:
+        """The trial as the file of a sweep holds it."""
+        points = [TrialPoint(epoch, value) for epoch, value in sorted(self.points.items())]
+        scores = TrialScores(self.failed, self.returns, self.successes)
+        return TrialRecord(dict(self.settings), self.run, self.state, self.error, scores, points)
 
     @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> Trial:
-        """The trial that `as_json` wrote."""
-        val = content["val"]
-        returns, successes = (Estimate(**val[name]) if name in val else None for name in ("return", "success"))
-        points = {point["epoch"]: point["return"] for point in content["points"]}
-        about = {name: content[name] for name in ("settings", "run", "state", "error")}
-        return cls(**about, returns=returns, successes=successes, failed=val["failed"], points=points)
+    def of(cls, record: TrialRecord) -> Trial:
+        """The trial that a record describes."""
+        val, points = record.val, {point.epoch: point.mean for point in record.points}
+        scores = val.returns, val.successes, val.failed
+        return cls(record.settings, record.run, record.state, *scores, points, record.error)
 
 
 def best(trials: Sequence[Trial]) -> int | None:

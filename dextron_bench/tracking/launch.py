@@ -14,12 +14,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from dextron_bench.processes import programs
-from dextron_bench.storage import schemas
+from dextron_bench.storage import records
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.run_folder import TRACKING
+from dextron_bench.tracking.follower import Counts
 
 COMMAND = programs.python("-m", "dextron_bench.tracking.process")
 LIVE = "live"  # The tracker that opens a window, which stays open after the training.
@@ -96,7 +97,7 @@ def _watch(follower: _Follower, is_over: threading.Event, say: Callable[[str], N
     """Says at once if a tracker ends before its training."""
     follower.process.wait()
     if not is_over.is_set():
-        say(f"tracker {follower.name} has ended ({_counts(follower)['error']}); the run goes on without it")
+        say(f"tracker {follower.name} has ended ({_counts(follower).error}); the run goes on without it")
 
 
 def _start(name: str, folder: Path, grace: float) -> _Follower:
@@ -121,12 +122,12 @@ def _outcome(follower: _Follower, deadline: float) -> str:
     return _line(follower, _counts(follower), was_killed)
 
 
-def _counts(follower: _Follower) -> dict[str, Any]:
+def _counts(follower: _Follower) -> Counts:
     """The counts of a tracker; of one that wrote none, zeros."""
     try:
-        return schemas.read(counts_file(follower.into), schemas.TRACKER)
+        return records.read(counts_file(follower.into), Counts)
     except (DamagedFile, OSError):
-        return {"points": 0, "evaluations": 0, "dropped": 0, "over": False, "error": "it showed nothing"}
+        return Counts(error="it showed nothing")
 
 
 def _wait(follower: _Follower, deadline: float) -> bool:
@@ -134,22 +135,22 @@ def _wait(follower: _Follower, deadline: float) -> bool:
     while time.monotonic() < deadline:
         if follower.process.poll() is not None:
             return True
-        if follower.name == LIVE and _counts(follower)["over"]:
+        if follower.name == LIVE and _counts(follower).over:
             return True
         time.sleep(0.1)
     return False
 
 
-def _line(follower: _Follower, counts: dict[str, Any], was_killed: bool) -> str:
-    evaluations = f"{counts['evaluations']} evaluation{'s' * (counts['evaluations'] != 1)}"
-    text = f"tracker {follower.name}: {counts['points']} points and {evaluations}"
+def _line(follower: _Follower, counts: Counts, was_killed: bool) -> str:
+    evaluations = f"{counts.evaluations} evaluation{'s' * (counts.evaluations != 1)}"
+    text = f"tracker {follower.name}: {counts.points} points and {evaluations}"
     text += f" with episodes in {follower.into}" if follower.name != LIVE else " with episodes shown"
-    if counts["dropped"]:
-        text += f"; {counts['dropped']} dropped ({counts['error']})"
-    elif counts["error"]:
-        text += f"; {counts['error']}"
+    if counts.dropped:
+        text += f"; {counts.dropped} dropped ({counts.error})"
+    elif counts.error:
+        text += f"; {counts.error}"
     if was_killed:
         text += "; it did not end and was stopped, the rest is missing"
-    elif not counts["over"]:
+    elif not counts.over:
         text += f"; it ended early, see {log_file(follower.into)}"
     return text

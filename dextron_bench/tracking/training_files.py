@@ -12,13 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.storage import schemas
+from dextron_bench.storage import records
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import SEED
-from dextron_bench.training import loop, timing
+from dextron_bench.training import loop, metric_rows, timing
 from dextron_bench.training.checkpoints import Checkpoints
+from dextron_bench.training.learning_curve import ValScores
 from dextron_bench.training.metric_rows import METRICS
+from dextron_bench.training.timing import Duration
 from dextron_bench.world import task
 
 CHUNK = 1 << 20  # Bytes of a file that are read at once.
@@ -75,7 +77,7 @@ class TrainingFiles:
         self.folder, self.seeds = folder, tuple(seeds)
         self._checkpoints = Checkpoints(folder, seeds)
         self._metrics, self._timing = _Lines(folder / METRICS), _Lines(folder / timing.FILE)
-        self._durations: dict[int, dict[str, Any]] = {}  # Rows of `timing.jsonl` by epoch.
+        self._durations: dict[int, Duration] = {}  # Rows of `timing.jsonl` by epoch.
         self._last: dict[int, tuple[int, int]] = {}  # The newest epoch of each seed, and its step.
         self._steps: dict[tuple[int, int], int] = {}  # Steps by epoch and seed.
         self._evaluated: set[tuple[int, int]] = set()
@@ -98,7 +100,7 @@ class TrainingFiles:
     def config(self) -> dict[str, Any]:
         """The config of the training; empty if there is none yet."""
         file = self.folder / "config.json"
-        return schemas.read(file, schemas.OBJECT) if file.exists() else {}
+        return records.read(file, dict[str, Any]) if file.exists() else {}
 
     def points(self) -> list[Point]:
         """New values of epochs: metrics under `train/`, rates and memory. An epoch counts once, though it may return.
@@ -107,13 +109,13 @@ class TrainingFiles:
         """
         self._read_durations()
         points = []
-        for row in self._metrics.new(schemas.METRIC):
-            epoch, seed = row["epoch"], row["seed"]
+        for row in filter(None, metric_rows.parse(self._metrics.new())):
+            epoch, seed = row.epoch, row.seed
             before, step_before = self._last.get(seed, (0, 0))
             if epoch > before:
-                step = int(row.get("frames", epoch * NOMINAL_STEPS))
+                step = int(row.metrics.get("frames", epoch * NOMINAL_STEPS))
                 self._last[seed], self._steps[epoch, seed] = (epoch, step), step
-                values = {f"train/{name}": value for name, value in row.items() if name not in ("epoch", "seed")}
+                values = {f"train/{name}": value for name, value in row.metrics.items()}
                 points.append(Point(epoch, seed, step, values | self._rates(epoch, step - step_before)))
         return points
 
@@ -133,29 +135,31 @@ class TrainingFiles:
             return
         self._evaluated.add((epoch, seed))
         try:
-            content = schemas.read(files[min(files)], schemas.VAL_SCORES)
+            content = records.read(files[min(files)], ValScores)
         except (DamagedFile, OSError):
             return
-        scores = content["scores"]
+        scores = content.scores
         success = sum(score == task.SUCCESS for score in scores) / len(scores)
         values = {"val/return": sum(scores) / len(scores), "val/success": success}
         step = self._steps.get((epoch, seed), epoch * NOMINAL_STEPS)
-        actions = [np.array(sequence) for sequence in content.get("actions", [])]
-        yield Evaluation(Point(epoch, seed, step, values), content["digest"], actions)
+        actions = [np.array(sequence) for sequence in content.actions]
+        yield Evaluation(Point(epoch, seed, step, values), content.digest, actions)
 
     def _read_durations(self) -> None:
-        for row in self._timing.new(schemas.DURATION):
-            if row["what"] == "epoch" and isinstance(row.get("epoch"), int):
-                self._durations[row["epoch"]] = row
+        for row in records.rows(self._timing.new(), Duration):
+            if row and row.what == "epoch" and row.epoch is not None:
+                self._durations[row.epoch] = row
 
     def _rates(self, epoch: int, steps: int) -> dict[str, float]:
         """Duration of an epoch [s], control steps of a seed per second, and memory [MB], as far as they are known."""
-        row = self._durations.get(epoch, {})
-        rates = {"time/seconds_per_epoch": row["seconds"]} if row else {}
-        if row.get("seconds"):
-            rates["time/steps_per_second"] = steps / row["seconds"]
-        names = {"memory": "memory/process_MB", "device_memory": "memory/device_MB"}
-        return rates | {names[name]: row[name] for name in names if name in row}
+        row = self._durations.get(epoch)
+        if row is None:
+            return {}
+        rates = {"time/seconds_per_epoch": row.seconds}
+        if row.seconds:
+            rates["time/steps_per_second"] = steps / row.seconds
+        memory = {"memory/process_MB": row.memory, "memory/device_MB": row.device_memory}
+        return rates | {name: amount for name, amount in memory.items() if amount is not None}
 
 
 class _Lines:
@@ -164,8 +168,8 @@ class _Lines:
     def __init__(self, file: Path) -> None:
         self._file, self._offset = file, 0
 
-    def new(self, schema: schemas.Schema) -> list[dict[str, Any]]:
-        """Rows of whole lines after those that were read, at most CHUNK bytes; all rows again if the file was cut."""
+    def new(self) -> bytes:
+        """Whole lines after those that were read, at most CHUNK bytes; all again if the file was cut."""
         try:
             with self._file.open("rb") as content:
                 if content.seek(0, 2) < self._offset:
@@ -173,7 +177,7 @@ class _Lines:
                 content.seek(self._offset)
                 whole = content.read(CHUNK).rpartition(b"\n")
         except OSError:
-            return []
+            return b""
         lines = b"".join(whole[:2])
         self._offset += len(lines)
-        return [row for row in schemas.rows(lines, schema) if row]
+        return lines

@@ -16,12 +16,13 @@ from typing import Any
 
 from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Trainer
-from dextron_bench.storage import atomic, hashing, locks, schemas, tensors
+from dextron_bench.storage import atomic, hashing, locks, records, tensors
 from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder, OtherForm
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.folders import visible
+from dextron_bench.storage.records import Amount, Count, Record
 from dextron_bench.training import checkpoint_list, metric_rows
-from dextron_bench.training.metric_rows import METRICS
+from dextron_bench.training.metric_rows import METRICS, MetricRow
 
 CHECKPOINT = "checkpoint.safetensors"
 JOURNALS = "journals"
@@ -30,6 +31,22 @@ LOCK = ".locked"  # Earlier versions left a file .lock.
 
 class Busy(RuntimeError):
     """A training that another process runs."""
+
+
+class Snapshot(Record, frozen=True):
+    """What a snapshot of weights says of its training, beside what a method needs to read it."""
+
+    epoch: Count
+    frames: Amount | None = None
+
+
+class _Checkpoint(Record, frozen=True):
+    """The metadata of a checkpoint; one of an earlier version lists no files."""
+
+    epoch: Count
+    epochs: Count
+    device: str
+    files: dict[str, str] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,24 +94,21 @@ class Checkpoints:
     def progress(self) -> TrainingProgress | None:
         """The progress in the last checkpoint, None if there is no checkpoint; raises DamagedFile."""
         about = self._about()
-        return TrainingProgress(about["epoch"], about["epochs"], about["device"]) if about else None
+        return TrainingProgress(about.epoch, about.epochs, about.device) if about else None
 
-    def _about(self) -> dict[str, Any]:
-        """The metadata of the last checkpoint, empty if there is no checkpoint; raises DamagedFile."""
+    def _about(self) -> _Checkpoint | None:
+        """The metadata of the last checkpoint, None if there is no checkpoint; raises DamagedFile."""
         file = self.folder / CHECKPOINT
         if not file.exists():
-            return {}
+            return None
         try:
-            about = schemas.read_about(file, schemas.CHECKPOINT)
+            return records.read_about(file, _Checkpoint)
         except tensors.OtherTensors as error:
             raise OtherForm(self.folder, error) from error
         except tensors.BadTensors as error:
             raise self._damaged(error) from error
-        return about
 
-    def save(
-        self, trainer: Trainer, progress: TrainingProgress, rows: list[dict[str, Any]], about: dict[str, Any]
-    ) -> None:
+    def save(self, trainer: Trainer, progress: TrainingProgress, rows: list[MetricRow], about: dict[str, Any]) -> None:
         """Writes the files of a period.
 
         `rows` are the metrics of its last epoch, which `metric_rows` has written; `about` becomes metadata of the
@@ -106,7 +120,7 @@ class Checkpoints:
         if (count := len(weights)) != len(self.seeds):
             raise AgentError(f"weights() of the trainer must have one for each of {len(self.seeds)} seeds, not {count}")
         tensors.write(self._journal(epoch), journal, {"epoch": epoch})
-        frames = {row["seed"]: row.get("frames") for row in rows}
+        frames = {row.seed: row.metrics.get("frames") for row in rows}
         for seed, arrays in zip(self.seeds, weights, strict=True):
             metadata = {**about, "seed": seed, "seeds": self.seeds, "epoch": epoch, "frames": frames.get(seed)}
             tensors.write(self.snapshot(epoch, seed), arrays, metadata)
@@ -151,7 +165,7 @@ class Checkpoints:
         progress = self.progress()
         return sorted(epoch for epoch in self._snapshots() if progress and epoch <= progress.epoch)
 
-    def metrics(self) -> list[dict[str, Any]]:
+    def metrics(self) -> list[MetricRow]:
         """One row for each epoch and seed, in order; raises DamagedFile."""
         return metric_rows.read(self.folder)
 
@@ -164,12 +178,12 @@ class Checkpoints:
         present = [self.snapshot(number, seed) for number in self.epochs() for seed in self.seeds]
         if not finished:
             present += [self._journal(number) for number in self._journaled() if number <= epoch]
-        if "files" not in about:
+        if about is None or about.files is None:
             return checkpoint_list.hashes(self.folder, [file for file in present if file.exists()])
-        listed = {name: about["files"][name] for name in about["files"] if name != METRICS}
+        listed = {name: sha256 for name, sha256 in about.files.items() if name != METRICS}
         needed = {name: listed[name] for name in listed if not (finished and name.startswith(JOURNALS))}
         checkpoint_list.check(self.folder, needed, present)
-        if hashing.digest(metric_rows.first(self.folder, self._rows(epoch))) != about["files"].get(METRICS):
+        if hashing.digest(metric_rows.first(self.folder, self._rows(epoch))) != about.files.get(METRICS):
             raise self._damaged(f"{METRICS} differs from what its checkpoint lists")
         return listed
 

@@ -11,12 +11,12 @@ from dextron_bench.methods.learners import Learner, TrainingSetup
 from dextron_bench.reaches import sources
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import Split, load_split
-from dextron_bench.storage import atomic, folder_config, schemas, tensors
+from dextron_bench.storage import atomic, folder_config, records, tensors
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder, runs_without, source_folder
 from dextron_bench.training import loop, timing
-from dextron_bench.training.checkpoints import Checkpoints
-from dextron_bench.training.learning_curve import Curve
+from dextron_bench.training.checkpoints import Checkpoints, Snapshot
+from dextron_bench.training.learning_curve import Curve, CurveFile
 
 
 class NoDevice(ValueError):
@@ -110,12 +110,13 @@ class TrainingJob:
         """Writes learning curve and best weights of a seed into the folder of its run, the weights last."""
         best, last = curve.best(seed), checkpoints.epochs()[-1]
         snapshot, run = checkpoints.snapshot(best, seed), self.run_folder(seed)
-        frames = schemas.read_about(checkpoints.snapshot(last, seed), schemas.SNAPSHOT).get("frames")
-        about = schemas.read_about(snapshot, schemas.SNAPSHOT)
-        about |= {"best_epoch": best, "epochs": last, "frames": frames and int(frames)}
+        frames = records.read_about(checkpoints.snapshot(last, seed), Snapshot).frames
+        records.read_about(snapshot, Snapshot)
+        about = tensors.read_about(snapshot)
+        about |= {"best_epoch": best, "epochs": last, "frames": None if frames is None else int(frames)}
         about |= {"without": self.without} if self.without else {}
         del about["epoch"]
-        atomic.write_json(run.curve, {"split": "val", "points": curve.points(seed)})
+        atomic.write_json(run.curve, CurveFile(curve.points(seed), "val"))
         tensors.write(run.weights, tensors.read(snapshot), about | {"reaches": self.reaches})
 
 

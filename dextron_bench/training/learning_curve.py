@@ -6,22 +6,64 @@ episodes.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+import pandas as pd
+from msgspec import Meta, field
 
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods.agents import as_agent_error
 from dextron_bench.methods.learners import Learner
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
-from dextron_bench.storage import atomic, hashing, schemas, tensors
+from dextron_bench.storage import atomic, hashing, records, tensors
 from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.records import Count, Record, Return, Scores, Share
 from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.world import task
 
 POINT_ROWS = 50  # Rows of `val` that make a point of the curve.
 SHOWN_ROWS = 2  # Rows of `val` whose actions are stored with the scores, so that these episodes can be watched.
 FINALISTS = 5  # Snapshots with the best points; their scores on all of `val` decide between them.
+
+
+Action = Annotated[float, Meta(ge=-1.0, le=1.0)]
+
+
+class CurvePoint(Record, frozen=True):
+    """A point of a learning curve: mean return [0, 20] and share of successes [0, 1] on rows of `val`."""
+
+    epoch: Count
+    mean: Return = field(name="return")
+    success: Share
+
+
+class CurveFile(Record, frozen=True):
+    """The content of `curve.json`: the learning curve of a seed, on a split."""
+
+    points: list[CurvePoint]
+    split: str = ""
+
+
+class ValScores(Record, frozen=True):
+    """The scores of a snapshot on the first rows of `val`, with their hash, and the actions on a few of these."""
+
+    digest: str
+    scores: Scores
+    sha256: str = ""
+    actions: tuple[list[Action], ...] = ()
+
+
+def read(file: Path) -> list[CurvePoint]:
+    """The points of the learning curve in a file; raises DamagedFile."""
+    return records.read(file, CurveFile).points
+
+
+def frame(points: Iterable[CurvePoint]) -> pd.DataFrame:
+    """A learning curve as a table with columns epoch, return and success."""
+    return pd.DataFrame([{"epoch": point.epoch, "return": point.mean, "success": point.success} for point in points])
 
 
 class Curve:
@@ -45,13 +87,13 @@ class Curve:
         epochs = self._checkpoints.epochs()
         return {seed: mean(self._scores(epochs[-1], seed, POINT_ROWS)) for seed in self._checkpoints.seeds if epochs}
 
-    def points(self, seed: int) -> list[dict[str, Any]]:
-        """The curve of a seed: epoch, mean return [0, 20] and share of successes [0, 1]."""
+    def points(self, seed: int) -> list[CurvePoint]:
+        """The curve of a seed."""
         points = []
         for epoch in self._checkpoints.epochs():
             scores = self._scores(epoch, seed, POINT_ROWS)
             success = sum(score == task.SUCCESS for score in scores) / len(scores)
-            points.append({"epoch": epoch, "return": mean(scores), "success": success})
+            points.append(CurvePoint(epoch, mean(scores), success))
         return points
 
     def best(self, seed: int) -> int:
@@ -72,18 +114,17 @@ class Curve:
 
     def _stored(self, file: Path, rows: int) -> list[float]:
         """The scores in a file; empty if there are none on this version of `val`. Raises DamagedFile."""
-        content = schemas.read(file, schemas.VAL_SCORES) if file.exists() else {}
-        if content.get("digest") != self._val.digest:
+        content = records.read(file, ValScores) if file.exists() else None
+        if content is None or content.digest != self._val.digest:
             return []
-        scores = content["scores"]
-        if len(scores) != rows or content.get("sha256") not in (None, _sha256(scores)):
+        scores = content.scores
+        if len(scores) != rows or content.sha256 not in ("", _sha256(scores)):
             raise DamagedFile(file, f"it does not hold the {rows} scores that were written")
         return scores
 
     def _play_and_store(self, snapshot: Path, file: Path, rows: int) -> list[float]:
         scores, actions = self._play(snapshot, rows)
-        content = {"digest": self._val.digest, "scores": scores, "sha256": _sha256(scores), "actions": actions}
-        atomic.write_json(file, content)
+        atomic.write_json(file, ValScores(self._val.digest, scores, _sha256(scores), tuple(actions)))
         return scores
 
     def _play(self, snapshot: Path, rows: int) -> tuple[list[float], list[list[float]]]:

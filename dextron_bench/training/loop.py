@@ -22,10 +22,11 @@ from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.training import metric_rows, timing
 from dextron_bench.training.checkpoints import Checkpoints, TrainingProgress
-from dextron_bench.training.learning_curve import FINALISTS, Curve
+from dextron_bench.training.learning_curve import FINALISTS, Curve, CurvePoint
+from dextron_bench.training.metric_rows import MetricRow
 from dextron_bench.world import model
 
-Watch = Callable[[dict[int, list[dict[str, Any]]]], None]  # Receives the learning curve of each seed.
+Watch = Callable[[dict[int, list[CurvePoint]]], None]  # Receives the learning curve of each seed.
 NAME = re.compile(r"training-(\d+(?:\+\d+)*)", re.ASCII)  # Names of the folders in which seeds train.
 
 
@@ -53,7 +54,7 @@ def training_folders(base: Path, below: str = "") -> dict[Path, tuple[int, ...]]
     return {folder: seeds for folder in visible(base, f"{below}training-*") if (seeds := seeds_of(folder))}
 
 
-def no_watch(curves: dict[int, list[dict[str, Any]]]) -> None:
+def no_watch(curves: dict[int, list[CurvePoint]]) -> None:
     """A Watch that never stops a training."""
 
 
@@ -148,7 +149,7 @@ class _TrainingRun:
 
         `note` goes with the progress.
         """
-        rows: list[dict[str, Any]] = []
+        rows: list[MetricRow] = []
         while trainer.epoch < last:
             rows = self._epoch(trainer)
             metric_rows.append(self._checkpoints.folder, rows)
@@ -156,7 +157,7 @@ class _TrainingRun:
         progress = TrainingProgress(last, self._learner.epochs, self._setup.device)
         self._checkpoints.save(trainer, progress, rows, self._about())
 
-    def _epoch(self, trainer: Trainer) -> list[dict[str, Any]]:
+    def _epoch(self, trainer: Trainer) -> list[MetricRow]:
         """Trains one epoch; returns its metrics, a row for each seed."""
         number, start, seeds = trainer.epoch + 1, time.perf_counter(), self._checkpoints.seeds
         with as_agent_error(f"epoch {number} of method {self._learner.label!r}"):
@@ -169,21 +170,21 @@ class _TrainingRun:
             )
         self._note_time("epoch", number, time.perf_counter() - start)
         rows = [
-            {"epoch": number, "seed": seed, **metric_rows.numbers(values, self._learner.label)}
+            MetricRow(number, seed, metric_rows.numbers(values, self._learner.label))
             for seed, values in zip(seeds, metrics, strict=True)
         ]
         for row in rows:
-            if names := [name for name, value in row.items() if not math.isfinite(value)]:
+            if names := [name for name, value in row.metrics.items() if not math.isfinite(value)]:
                 raise Diverged(self._divergence(row, names[0]))
         return rows
 
-    def _divergence(self, row: dict[str, Any], name: str) -> str:
+    def _divergence(self, row: MetricRow, name: str) -> str:
         """The message for a metric that is not finite."""
         progress = self._checkpoints.progress()
         last = f"the last good checkpoint is at epoch {progress.epoch}" if progress else "there is no checkpoint yet"
         return (
-            f"training of {self._learner.label!r} diverged: {name!r} of seed {row['seed']} is {row[name]} in epoch "
-            f"{row['epoch']}; {last} in {self._checkpoints.folder}"
+            f"training of {self._learner.label!r} diverged: {name!r} of seed {row.seed} is {row.metrics[name]} in "
+            f"epoch {row.epoch}; {last} in {self._checkpoints.folder}"
         )
 
     def _show_curves(self) -> None:

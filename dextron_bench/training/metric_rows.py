@@ -3,16 +3,32 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dextron_bench.methods.agents import AgentError
-from dextron_bench.storage import atomic, schemas
+from dextron_bench.storage import atomic, records
 from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder
+from dextron_bench.storage.records import Count, Record
 
 METRICS = "metrics.jsonl"  # In the folder of a training.
 KEYS = ("epoch", "seed")  # The names in a row that are no metrics.
+
+
+class _Keys(Record, frozen=True):
+    epoch: Count
+    seed: Count
+
+
+@dataclass(frozen=True, slots=True)
+class MetricRow:
+    """The metrics of an epoch and a seed."""
+
+    epoch: int
+    seed: int
+    metrics: dict[str, float]
 
 
 def numbers(metrics: Any, method: str) -> dict[str, float]:
@@ -35,11 +51,12 @@ def _number(value: Any, name: str, method: str) -> float:
         raise AgentError(f"metric {name!r} of method {method!r} must be one number; got {shown}") from error
 
 
-def append(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
+def append(folder: Path, rows: Sequence[MetricRow]) -> None:
     """Adds rows at the end, where other processes can read them at once."""
     file = folder / METRICS
     with atomic.naming(file), file.open("a", encoding="utf-8") as content:
-        content.write("".join(json.dumps(row, sort_keys=True) + "\n" for row in rows))
+        for row in rows:
+            content.write(json.dumps({"epoch": row.epoch, "seed": row.seed, **row.metrics}, sort_keys=True) + "\n")
 
 
 def sync(folder: Path) -> None:
@@ -48,14 +65,26 @@ def sync(folder: Path) -> None:
         atomic.sync(folder / METRICS)
 
 
-def read(folder: Path) -> list[dict[str, Any]]:
+def parse(lines: bytes) -> Iterator[MetricRow | None]:
+    """The row in each line; None for a line that holds none."""
+    for row in records.rows(lines, dict[str, int | float]):
+        try:
+            keys = records.convert(row, _Keys)
+        except records.Mismatch:
+            yield None
+        else:
+            metrics = {name: value for name, value in (row or {}).items() if name not in KEYS}
+            yield MetricRow(keys.epoch, keys.seed, metrics)
+
+
+def read(folder: Path) -> list[MetricRow]:
     """All rows in order, none before the first epoch; raises DamagedFile.
 
     The last line may not be whole, while a process writes it or after this process was killed. It is left out.
     """
     file = folder / METRICS
     content = file.read_bytes() if file.exists() else b""
-    rows = list(schemas.rows(content[: content.rfind(b"\n") + 1], schemas.METRIC))
+    rows = list(parse(content[: content.rfind(b"\n") + 1]))
     if None in rows:
         raise DamagedFile(folder, f"{METRICS}: line {rows.index(None) + 1} does not hold the metrics of an epoch")
     return [row for row in rows if row]

@@ -128,4 +128,4 @@ def test_an_interrupted_run_is_code_130_and_continues_later(here: Path, capsys: 
     left = here / "runs" / "mine" / "synthetic" / "seed0"
     assert sorted(os.listdir(left)) == ["config.json", "provenance.json", "times.json"]
     assert main.main(words) == 0
-    assert len(read_result(left / "result.json")["splits"]["test"]["scores"]) == 2
+    assert len(read_result(left / "result.json").splits["test"].scores) == 2

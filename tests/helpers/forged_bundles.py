@@ -13,9 +13,11 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from msgspec import to_builtins
 
+from dextron_bench.evaluation.results import scores_by_split
 from dextron_bench.methods.isolation.isolated_agent import Limits
-from dextron_bench.runs import result_files, run_files
+from dextron_bench.runs import run_files
 from dextron_bench.storage import hashing
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle, playing, verification
@@ -74,7 +76,7 @@ class Forgery:
     def conclude(self) -> None:
         """Computes the result of the changed episodes."""
         table = pd.read_parquet(RunFolder(self.seed).episodes)
-        self.json("seed0/result.json", lambda result: result.update(splits=result_files.scores_by_split(table)))
+        self.json("seed0/result.json", lambda result: result.update(splits=to_builtins(scores_by_split(table))))
 
     def checked(self, **options: Any) -> Verdict:
         """Packs the bundle with correct hashes, and verifies it."""

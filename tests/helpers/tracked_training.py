@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -35,9 +34,9 @@ def killed(folder: Path, epoch: int) -> None:
     """Trains until the metrics of an epoch are written, and ends there."""
     append = metric_rows.append
 
-    def append_and_end(place: Path, rows: Sequence[dict[str, Any]]) -> None:
+    def append_and_end(place: Path, rows: Sequence[metric_rows.MetricRow]) -> None:
         append(place, rows)
-        if rows[0]["epoch"] == epoch:
+        if rows[0].epoch == epoch:
             raise Killed
 
     with pytest.MonkeyPatch.context() as patched:

@@ -82,16 +82,16 @@ def test_a_run_killed_between_its_first_two_files_still_ends(tmp_path: Path, mon
 def test_the_result_is_computed_from_the_episodes(tmp_path: Path):
     folder = execute(tmp_path, PLAN)
     episodes, result = pd.read_parquet(folder / "episodes.parquet"), result_files.read_result(folder / "result.json")
-    assert (result["method"], result["reaches"], result["seed"]) == ("exp", "synthetic", 0)
-    assert set(result["splits"]) == {"val", "test"}
-    for name, split in result["splits"].items():
+    assert (result.method, result.reaches, result.seed) == ("exp", "synthetic", 0)
+    assert set(result.splits) == {"val", "test"}
+    for name, split in result.splits.items():
         rows = episodes[episodes["split"] == name]
         assert rows["row"].tolist() == list(range(len(rows)))
-        assert split["scores"] == rows["score"].tolist() == [20.0] * len(rows)
+        assert split.scores == rows["score"].tolist() == [20.0] * len(rows)
         assert set(rows["cause"]) == {"solved"}
         assert rows["closing_lag"].between(0.0, 0.12).all()
-        assert split["digest"] == load_split("synthetic", name).digest
-        assert split["failed"] == 0
+        assert split.digest == load_split("synthetic", name).digest
+        assert split.failed == 0
     assert episodes["success"].all()
 
 
@@ -110,7 +110,7 @@ def test_actions_that_end_before_the_episode_fail_it():
 def test_a_later_execution_adds_splits(tmp_path: Path):
     execute(tmp_path, Plan("nothing", "synthetic", ("val",), 0))
     folder = execute(tmp_path, Plan("nothing", "synthetic", ("open",), 0))
-    assert set(result_files.read_result(folder / "result.json")["splits"]) == {"val", "open"}
+    assert set(result_files.read_result(folder / "result.json").splits) == {"val", "open"}
 
 
 def test_a_changed_split_is_played_again(tmp_path: Path):
@@ -124,8 +124,7 @@ def test_a_changed_split_is_played_again(tmp_path: Path):
     episodes = pd.read_parquet(folder / "episodes.parquet")
     assert episodes["offset_x"].tolist() == [0.03]
     assert (
-        result_files.read_result(folder / "result.json")["splits"]["open"]["digest"]
-        == load_split("synthetic", "open").digest
+        result_files.read_result(folder / "result.json").splits["open"].digest == load_split("synthetic", "open").digest
     )
 
 

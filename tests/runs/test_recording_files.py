@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import to_builtins
 
 from dextron_bench import recording
 from dextron_bench.evaluation.rollout import rollout
@@ -43,7 +44,7 @@ def test_an_episode_without_a_step_is_not_recorded_and_not_played_again(
     spec = constant_agent(tmp_path, "np.nan")
     plan = Plan(spec, "synthetic", ("open",), seed=0, record=1)
     folder = execute(tmp_path, plan)
-    assert result_files.read_result(folder / "result.json")["splits"]["open"] == {
+    assert to_builtins(result_files.read_result(folder / "result.json").splits["open"]) == {
         "digest": load_split("synthetic", "open").digest, "scores": [0.0], "failed": 1,
         "causes": {"agent failed": 1}, "closing_lag": None, "actions": ["af5570f5a181"],
     }  # fmt: skip

@@ -8,10 +8,15 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from msgspec import to_builtins
+from msgspec.structs import replace
 
+from dextron_bench.evaluation.results import Result, scores_by_split
 from dextron_bench.runs import result_files
 from dextron_bench.runs.result_files import UnknownResult
+from dextron_bench.storage import records
 from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.provenance import Provenance
 from dextron_bench.storage.run_folder import RunFolder
 
 SPLIT: dict[str, Any] = {"digest": "d", "scores": [1.0], "failed": 0, "causes": {"slipped": 1}, "closing_lag": 0.04}
@@ -29,7 +34,7 @@ def write(runs: Path, method: str, seed: int, score: float = 1.0, reaches: str =
 
 def described(results: result_files.Results) -> list[tuple[str, str, int, float]]:
     """Method, source, seed and score of each result."""
-    return [(r["method"], r["reaches"], r["seed"], r["splits"]["test"]["scores"][0]) for r in results]
+    return [(r.method, r.reaches, r.seed, r.splits["test"].scores[0]) for r in results]
 
 
 @pytest.fixture
@@ -127,7 +132,7 @@ def test_the_scores_of_a_split_are_computed_from_its_rows():
             "closing_lag": [0.1, None, None],
         }
     )
-    assert result_files.scores_by_split(table) == {
+    assert {name: to_builtins(scores) for name, scores in scores_by_split(table).items()} == {
         "val": {
             "digest": "v",
             "scores": [20.0, 0.0],
@@ -153,7 +158,7 @@ def test_a_damaged_result_is_named(tmp_path: Path, text: str):
     file = RunFolder.of(tmp_path, "a", "real", 0).result
     file.parent.mkdir(parents=True)
     file.write_text(json.dumps(RESULT))
-    assert list(result_files.results(tmp_path)) == [RESULT]
+    assert list(result_files.results(tmp_path)) == [records.convert(RESULT, Result)]
     file.write_text(text)
     with pytest.raises(DamagedFile, match=r"result\.json is damaged"):
         list(result_files.results(tmp_path))
@@ -163,6 +168,7 @@ def test_published_results_of_another_physics_are_not_put_beside(runs: Path):
     """A result that does not name its physics has nothing beside it."""
     file = write(runs.parent / "published", "sor", 0)
     file.write_text(json.dumps(RESULT | {"method": "sor", "provenance": {"physics": "b" * 64}}))
-    known = RESULT | {"provenance": {"physics": "b" * 64}}
-    assert [one["method"] for one in result_files.published_beside([known])] == ["sor"]
-    assert result_files.published_beside([RESULT]) == []
+    unknown = records.convert(RESULT, Result)
+    known = replace(unknown, provenance=Provenance(physics="b" * 64))
+    assert [one.method for one in result_files.published_beside([known])] == ["sor"]
+    assert result_files.published_beside([unknown]) == []

@@ -6,14 +6,16 @@ import math
 
 import pytest
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.scores import robustness
+from tests.helpers import results
 
 
-def result(method: str, seed: int = 0, **scores: list[float]) -> dict:
+def result(method: str, seed: int = 0, **scores: list[float]) -> Result:
     """A result with the scores of splits, whose names have `_` for `+` and `-`."""
     names = {"test": "test", "delay40": "test+delay-40", "noisy": "test+sensing-1", "hard": "hard"}
     splits = {names[name]: {"scores": values} for name, values in scores.items()}
-    return {"method": method, "reaches": "real", "seed": seed, "splits": splits}
+    return results.result(method, seed, splits=splits)
 
 
 def test_losses_are_paired_by_setting_and_seed():

@@ -3,18 +3,22 @@
 import numpy as np
 import pandas as pd
 import pytest
+from msgspec.structs import replace
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.scores import standings
 from dextron_bench.splits import strata
+from dextron_bench.splits.fresh_settings import FreshScores, FreshSplitScores
 from dextron_bench.splits.loading import load_split
+from tests.helpers import results
 
 
 def result(
     method: str, seed: int, scores: list[float], digest: str = "a" * 64, failed: int = 0, lag: float | None = None
-) -> dict:
+) -> Result:
     causes = {"solved": sum(score == 20.0 for score in scores), "slipped": sum(score < 20.0 for score in scores)}
     split = {"digest": digest, "scores": scores, "failed": failed, "causes": causes, "closing_lag": lag}
-    return {"method": method, "reaches": "real", "seed": seed, "splits": {"test": split}, "provenance": {}}
+    return results.result(method, seed, splits={"test": split})
 
 
 def test_a_row_is_the_mean_over_seeds_and_settings():
@@ -45,14 +49,14 @@ def test_no_results_make_an_empty_table():
     assert standings.table([]).empty
 
 
-def noisy(method: str, lead: float, seed: int = 0, reaches: str = "real", digest: str = "a" * 64) -> dict:
+def noisy(method: str, lead: float, seed: int = 0, reaches: str = "real", digest: str = "a" * 64) -> Result:
     """Invented integer scores of 50 rows around 10 + lead, with little noise."""
     scores = 10.0 + lead + np.random.default_rng([seed, *method.encode()]).integers(-2, 3, 50)
-    return result(method, seed, scores.tolist(), digest) | {"reaches": reaches}
+    return replace(result(method, seed, scores.clip(0.0, 20.0).tolist(), digest), reaches=reaches)
 
 
-def column(results: list[dict], name: str) -> dict:
-    return standings.table(results).set_index("method")[name].to_dict()
+def column(played: list[Result], name: str) -> dict:
+    return standings.table(played).set_index("method")[name].to_dict()
 
 
 def test_methods_are_ranked_but_the_ceiling_is_not():
@@ -96,8 +100,8 @@ def test_the_interquartile_mean_of_a_shipped_split_is_taken_over_its_regions():
     """Of sixteen regions the eight nearest to -x score 20, and the others 0; four are dropped at each end."""
     split = load_split("real", "test")
     near = strata.strata(split)["angle"] <= 1
-    results = result("a", 0, np.where(near, 20.0, 0.0).tolist(), split.digest)
-    row = standings.table([results]).iloc[0]
+    played = result("a", 0, np.where(near, 20.0, 0.0).tolist(), split.digest)
+    row = standings.table([played]).iloc[0]
     assert row["iqm"] == 10.0  # Four of the middle eight regions score 20.
     assert np.isnan(standings.table([result("a", 0, [20.0])]).iloc[0]["iqm"])
 
@@ -117,23 +121,22 @@ def test_results_with_fewer_rows_than_the_shipped_split_are_refused():
 def test_seeds_of_two_methods_are_drawn_independently():
     """A's seeds are 1 better than B's, but far apart. If they were drawn together, the difference would always be 1."""
     seeds = (0.0, 9.0, 18.0)
-    results = [
+    played = [
         result(method, k, [lead + mean] * 50)
         for method, lead in (("a", 1.0), ("b", 0.0))
         for k, mean in enumerate(seeds)
     ]
-    assert column(results, "rank") == {"a": 1, "b": 1}
+    assert column(played, "rank") == {"a": 1, "b": 1}
 
 
-def with_fresh(one: dict, scores: list[float], digest: str = "f" * 64) -> dict:
-    played = {"test": {"digest": digest, "scores": scores}}
-    return one | {"fresh": {"beacon": "b", "submission": "s", "splits": played}}
+def with_fresh(one: Result, scores: list[float], digest: str = "f" * 64) -> Result:
+    return replace(one, fresh=FreshScores("b", "s", {"test": FreshSplitScores(digest, scores)}))
 
 
 def test_a_gap_beyond_noise_marks_a_row_and_ranks_it_by_its_fresh_scores():
     """It knows the split by heart: 20 there, 3 on fresh settings, so that it comes after a method with 10."""
     memory = with_fresh(result("memory", 0, [20.0] * 50), [3.0, 0.0, 6.0] * 10)
-    honest = with_fresh(noisy("honest", 0.0), noisy("honest", 0.0, seed=1)["splits"]["test"]["scores"])
+    honest = with_fresh(noisy("honest", 0.0), noisy("honest", 0.0, seed=1).splits["test"].scores)
     rows = standings.table([memory, honest])
     assert rows["method"].tolist() == ["honest", "memory"]
     assert rows["marked"].tolist() == [False, True]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from msgspec import to_builtins
 
 import baselines
 from dextron_bench.cli import main
@@ -31,21 +32,21 @@ def name(file: Path) -> str:
 @pytest.mark.parametrize("file", RESULTS, ids=name)
 def test_a_result_is_complete_and_uses_the_splits_that_ship(file: Path):
     result = result_files.read_result(file)
-    assert name(file) == f"{result['method']}/{result['reaches']}/seed{result['seed']}"
-    for split_name in ranking_splits(result["reaches"]):
-        split, published = load_split(result["reaches"], split_name), result["splits"][split_name]
-        assert published["digest"] == split.digest
-        assert len(published["scores"]) == sum(published["causes"].values()) == len(split.cases)
-        assert published["causes"].get("solved", 0) == published["scores"].count(20.0)
-        assert published["failed"] == 0
+    assert name(file) == f"{result.method}/{result.reaches}/seed{result.seed}"
+    for split_name in ranking_splits(result.reaches):
+        split, published = load_split(result.reaches, split_name), result.splits[split_name]
+        assert published.digest == split.digest
+        assert len(published.scores) == sum(published.causes.values()) == len(split.cases)
+        assert published.causes.get("solved", 0) == published.scores.count(20.0)
+        assert published.failed == 0
 
 
 @pytest.mark.parametrize("file", (BOARD / "results/exp").glob("*/seed0/result.json"), ids=name)
 def test_experts_solve_every_row_of_the_splits_that_can_be_solved(file: Path):
-    splits = result_files.read_result(file)["splits"]
+    splits = result_files.read_result(file).splits
     assert "hard" in splits
     for split_name, split in splits.items():
-        assert split_name == "open" or set(split["scores"]) == {20.0}
+        assert split_name == "open" or set(split.scores) == {20.0}
 
 
 def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
@@ -61,9 +62,10 @@ def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
 @pytest.mark.parametrize("file", WEIGHTS, ids=name)
 def test_weights_that_ship_made_the_published_result(file: Path):
     result = result_files.read_result(BOARD / "results" / name(file) / "result.json")
-    assert result["training"].items() >= weights.metadata(file).items()
+    assert result.training is not None
+    assert to_builtins(result.training).items() >= weights.metadata(file).items()
     points = atomic.read_json(BOARD / "results" / name(file) / "curve.json")["points"]
-    assert result["training"]["best_epoch"] in [point["epoch"] for point in points]
+    assert result.training.best_epoch in [point["epoch"] for point in points]
 
 
 @pytest.mark.parametrize(
@@ -82,4 +84,4 @@ def test_weights_that_ship_reproduce_the_published_scores(file: Path, rows: int,
     agent, source = weights.load_agent(learner, file), opened(reaches)
     scores = {row: episode.score for row, episode in rollout(agent, source, split.cases[:rows])}
     result = result_files.read_result(BOARD / "results" / name(file) / "result.json")
-    assert [scores[row] for row in range(rows)] == result["splits"]["test"]["scores"][:rows]
+    assert [scores[row] for row in range(rows)] == result.splits["test"].scores[:rows]

@@ -95,7 +95,7 @@ WRITER = """
 import sys
 from pathlib import Path
 from dextron_bench.storage import folder_config, provenance
-provenance.collect = lambda physics: {"git": "1234"}
+provenance.collect = lambda physics: provenance.Provenance(git="1234")
 folder, seed = Path(sys.argv[1]), int(sys.argv[2])
 for line in sys.stdin:
     try:

@@ -9,6 +9,7 @@ import pytest
 
 from dextron_bench.submissions import entry
 from dextron_bench.submissions.entry import BadSubmission, Entry
+from dextron_bench.submissions.manifest import Agent
 
 
 def test_settings_of_an_installed_method_are_complete():
@@ -43,7 +44,7 @@ def test_the_manifest_names_files_without_their_folders(tmp_path: Path):
     file.write_text("")
     submission = Entry("mine", f"{file}:Mine", "synthetic", (1, 0), {"near": 0.1})
     manifest = submission.manifest()
-    assert manifest["agent"] == {"kind": "code", "spec": "mine.py:Mine", "settings": {"near": 0.1}, "weights": ""}
-    assert (manifest["name"], manifest["reaches"], manifest["seeds"]) == ("mine", "synthetic", [1, 0])
+    assert manifest.agent == Agent("code", "mine.py:Mine", {"near": 0.1}, "")
+    assert (manifest.name, manifest.reaches, manifest.seeds) == ("mine", "synthetic", [1, 0])
     assert submission.files() == {"mine.py": file}
     assert submission.folder(tmp_path) == tmp_path / "submissions" / "mine" / "synthetic"

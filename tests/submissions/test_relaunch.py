@@ -8,6 +8,7 @@ import pytest
 
 from dextron_bench.submissions import playing, relaunch
 from dextron_bench.submissions.entry import MANIFEST_KINDS
+from dextron_bench.submissions.manifest import Agent, AgentKind
 from tests.helpers.forged_bundles import Forgery
 
 
@@ -79,11 +80,10 @@ def test_a_manifest_starts_nothing_outside_its_bundle(
         ("policy", "policy.onnx", ""),
     ],
 )
-def test_agents_of_each_kind_start_from_the_bundle(kind: str, spec: str, weights: str, tmp_path: Path):
+def test_agents_of_each_kind_start_from_the_bundle(kind: AgentKind, spec: str, weights: str, tmp_path: Path):
     for name in ("near.py", "policy.pt", "policy.onnx", "seed0.safetensors"):
         (tmp_path / name).touch()
-    agent = {"kind": kind, "spec": spec, "settings": {}, "weights": weights}
-    launch = relaunch.launch_of(agent, tmp_path)
+    launch = relaunch.launch_of(Agent(kind, spec, {}, weights), tmp_path)
     inside = kind == "policy" or ".py:" in spec
     assert (str(launch.spec), launch.command) == (f"{tmp_path}/{spec}" if inside else spec, ())
     assert MANIFEST_KINDS[launch.spec.kind] == kind

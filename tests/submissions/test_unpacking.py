@@ -6,13 +6,13 @@ import json
 import zipfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import pytest
 
+from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.storage import hashing
 from dextron_bench.submissions import bundle, unpacking
-from dextron_bench.submissions.declaration import Declaration
 
 
 @pytest.fixture
@@ -40,11 +40,11 @@ def test_two_processes_may_unpack_one_bundle(empty: Path, tmp_path: Path, monkey
     """The first to end gives the folder its name, and the other one takes that."""
     place = tmp_path / "runs" / unpacking.FOLDER / hashing.sha256(empty)[:16]
 
-    def unpack(file: Path, part: Path) -> dict[str, Any]:
+    def unpack(file: Path, part: Path) -> SimpleNamespace:
         for folder in (part, place):
             folder.mkdir()
             (folder / "bundle.json").touch()
-        return {"seeds": [], "reaches": "synthetic"}
+        return SimpleNamespace(seeds=[], reaches="synthetic")
 
     monkeypatch.setattr(bundle, "unpack", unpack)
     assert unpacking.unpack_for_viewing(empty, tmp_path / "runs") == place

@@ -12,7 +12,7 @@ from dextron_bench.storage import atomic
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.training import learning_curve
 from dextron_bench.training.checkpoints import Checkpoints
-from dextron_bench.training.learning_curve import Curve
+from dextron_bench.training.learning_curve import Curve, CurvePoint
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.tiny_training import QUICK, SEEDS, train
 from tests.helpers.toy_learner import Toy
@@ -38,7 +38,7 @@ def test_the_best_snapshot_is_the_latest_of_equal_finalists(tmp_path: Path, monk
     write_scores(checkpoints, val, 3, [9.0, 6.0])
     curve = Curve(QUICK, checkpoints, SOURCE, val)
     assert curve.best(0) == 3
-    assert curve.points(0)[1] == {"epoch": 2, "return": 4.0, "success": 0.0}
+    assert curve.points(0)[1] == CurvePoint(2, 4.0, 0.0)
 
 
 def test_the_last_point_is_the_mean_of_the_newest_snapshot(tmp_path: Path):
@@ -46,7 +46,7 @@ def test_the_last_point_is_the_mean_of_the_newest_snapshot(tmp_path: Path):
     checkpoints = train(tmp_path / "a")
     write_scores(checkpoints, val, 5, [7.0])
     curve = Curve(QUICK, checkpoints, SOURCE, val)
-    assert curve.last_point() == {0: 7.0, 3: curve.points(3)[-1]["return"]}
+    assert curve.last_point() == {0: 7.0, 3: curve.points(3)[-1].mean}
     assert Curve(QUICK, Checkpoints(tmp_path / "empty", SEEDS), SOURCE, val).last_point() == {}
 
 
@@ -58,7 +58,7 @@ def test_the_actions_of_the_first_rows_are_stored_and_may_be_missing(tmp_path: P
     assert content["actions"] == [[score / 20] * 3 for score in content["scores"]]
     del content["actions"]
     file.write_text(json.dumps(content))
-    assert Curve(QUICK, checkpoints, SOURCE, load_split("synthetic", "test")).points(0)[0]["epoch"] == 2
+    assert Curve(QUICK, checkpoints, SOURCE, load_split("synthetic", "test")).points(0)[0].epoch == 2
 
 
 def test_scores_on_another_version_of_val_do_not_count(tmp_path: Path):

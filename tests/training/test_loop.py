@@ -33,9 +33,7 @@ def test_a_training_writes_metrics_and_snapshots_and_reports_epochs(tmp_path: Pa
     reports = []
     checkpoints = train(tmp_path / "a", report=lambda *parts: reports.append(parts))
     assert checkpoints.epochs() == [2, 4, 5]
-    assert [(row["epoch"], row["seed"]) for row in checkpoints.metrics()] == [
-        (e, s) for e in range(1, 6) for s in SEEDS
-    ]
+    assert [(row.epoch, row.seed) for row in checkpoints.metrics()] == [(e, s) for e in range(1, 6) for s in SEEDS]
     about = tensors.read_about(checkpoints.snapshot(4, 3))
     assert (about["label"], about["seed"], about["seeds"], about["epoch"], about["frames"]) == (
         "toy-0.1", 3, [0, 3], 4, 80.0,
@@ -60,9 +58,9 @@ def test_a_finished_training_computes_nothing_and_changes_no_byte(tmp_path: Path
 def test_a_training_that_a_watch_stopped_continues_with_the_same_bytes(tmp_path: Path):
     epochs: list[list[int]] = []
 
-    def watch(curves: dict[int, list[dict[str, Any]]]) -> None:
+    def watch(curves: dict[int, list[learning_curve.CurvePoint]]) -> None:
         assert list(curves) == list(SEEDS)
-        epochs.append([point["epoch"] for point in curves[SEEDS[-1]]])
+        epochs.append([point.epoch for point in curves[SEEDS[-1]]])
         if len(epochs) == 2:
             raise loop.StoppedEarly
 
@@ -125,7 +123,7 @@ def test_a_training_killed_after_the_metrics_of_any_epoch_ends_with_the_same_byt
 
         def killed(place: Path, rows: Any, last: int = last) -> None:
             append(place, rows)
-            if rows[0]["epoch"] == last:
+            if rows[0].epoch == last:
                 raise Killed
 
         with monkeypatch.context() as patched:

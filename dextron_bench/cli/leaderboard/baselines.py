@@ -37,5 +37,5 @@ class BaselineFlags:
         rows: dict[str, list[Row]] = {}
         for row in verify_board.rows(self.board, self.method, self.reaches):
             if not row.run.episodes.exists():
-                rows.setdefault(row.result["reaches"], []).append(row)
+                rows.setdefault(row.result.reaches, []).append(row)
         return rows

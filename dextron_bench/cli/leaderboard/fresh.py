@@ -46,8 +46,8 @@ class Fresh(BaselineFlags):
                 self.board, reaches, self.beacon, self.rows, self.threads, progress
             )
         for row in rows:
-            played = row.result.get("fresh", {}).get("splits", {})
-            if {name: one["digest"] for name, one in played.items()} != {one.name: one.digest for one in splits}:
+            played = row.result.fresh.splits if row.result.fresh else {}
+            if {name: one.digest for name, one in played.items()} != {one.name: one.digest for one in splits}:
                 with progress_bar(row.name, self.quiet) as progress:
                     fresh_baselines.play(row.run, row.result, fresh, splits, self.threads, progress)
             print(row.name, flush=True)

@@ -17,6 +17,7 @@ from dextron_bench.splits.tracks import PLUS
 if TYPE_CHECKING:
     import pandas as pd
 
+    from dextron_bench.evaluation.results import Result
     from dextron_bench.scores.robustness import Robustness
 
 FRESH = ("fresh [95 %]", "gap [95 %]", "mark")  # Columns of a table in which some row has played fresh settings.
@@ -129,7 +130,7 @@ def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
         print_table(title, [*columns, *(FRESH if is_fresh else ()), *counts], lines, OPTIONAL)
 
 
-def print_beside_published(results: list[dict[str, Any]], played: Collection[str], as_json: bool = False) -> bool:
+def print_beside_published(results: list[Result], played: Collection[str], as_json: bool = False) -> bool:
     """Prints the rows of splits that were played, with the published rows beside them; True if an episode failed.
 
     JSON holds the new rows alone.
@@ -159,7 +160,7 @@ def print_endings(rows: pd.DataFrame) -> None:
         print_table(title, ["method", *CAUSES, LAG], lines, ("agent failed", "never reached", LAG))
 
 
-def print_robustness(results: Iterable[dict[str, Any]]) -> None:
+def print_robustness(results: Iterable[Result]) -> None:
     """Prints mean returns under tracks, and how much lower they are than without, if some were played."""
     from dextron_bench.scores import robustness
     from dextron_bench.splits.tracks import TRACKS

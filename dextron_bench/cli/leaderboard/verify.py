@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -18,6 +18,7 @@ from dextron_bench.reaches.sources import SourceName
 from dextron_bench.storage.printable import printable, printable_line
 
 if TYPE_CHECKING:
+    from dextron_bench.submissions.manifest import Manifest
     from dextron_bench.submissions.verdict import Verdict
 
 
@@ -126,7 +127,7 @@ class Add:
 
         with unpacked(self.bundle) as opened:
             folder, manifest = opened
-            add.check_name(manifest["name"], manifest["reaches"], self.board, self.replace)
+            add.check_name(manifest.name, manifest.reaches, self.board, self.replace)
             verdict = _verify(opened, self)
             code = print_verdict(verdict)
             if verdict.passed:
@@ -135,7 +136,7 @@ class Add:
 
 
 @contextmanager
-def unpacked(file: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
+def unpacked(file: Path) -> Iterator[tuple[Path, Manifest]]:
     """Unpacks a bundle into a temporary folder; yields the folder and the manifest."""
     from dextron_bench.submissions import bundle as submission_bundle
 
@@ -143,7 +144,7 @@ def unpacked(file: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
         yield Path(folder), submission_bundle.unpack(file, Path(folder))
 
 
-def _verify(opened: tuple[Path, dict[str, Any]], flags: Verify | Add) -> Verdict:
+def _verify(opened: tuple[Path, Manifest], flags: Verify | Add) -> Verdict:
     from dextron_bench.splits.fresh_settings import FreshSettings
     from dextron_bench.storage import hashing
     from dextron_bench.submissions import verification
@@ -159,7 +160,7 @@ def _verify(opened: tuple[Path, dict[str, Any]], flags: Verify | Add) -> Verdict
 
 def print_verdict(verdict: Verdict) -> int:
     """Prints the result of a verification and returns the exit code."""
-    name = f"{verdict.manifest['name']} on {verdict.manifest['reaches']} reaches"
+    name = f"{verdict.manifest.name} on {verdict.manifest.reaches} reaches"
     for note in verdict.notes:
         print(printable_line(f"note: {note}"))
     if verdict.passed:
@@ -174,10 +175,9 @@ def print_fresh(verdict: Verdict) -> None:
     """Prints what the agent scored on fresh settings, beside its scores on the splits, if it played any."""
     from dextron_bench.scores import cells, standings
 
-    rows = standings.table(verdict.results.values())
-    if not rows["fresh"].notna().any():
+    rows, fresh = standings.table(verdict.results.values()), next(iter(verdict.results.values())).fresh
+    if fresh is None or not rows["fresh"].notna().any():
         return
-    beacon = next(iter(verdict.results.values()))["fresh"]["beacon"]
     lines = [
         [
             row["split"],
@@ -188,4 +188,4 @@ def print_fresh(verdict: Verdict) -> None:
         ]
         for row in rows.to_dict("records")
     ]
-    print_table(f"fresh settings, beacon {printable(beacon)}", ["split", "return", "fresh", "gap", ""], lines)
+    print_table(f"fresh settings, beacon {printable(fresh.beacon)}", ["split", "return", "fresh", "gap", ""], lines)

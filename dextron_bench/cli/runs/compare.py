@@ -79,9 +79,10 @@ def _draw(entries: Sequence[Entry], file: Path) -> None:
     import pandas as pd
 
     from dextron_bench.scores.figures.training import learning_curves
+    from dextron_bench.training import learning_curve
 
     curves = {
-        entry.name: {seed: pd.DataFrame(points) for seed, points in entry.curves.items()}
+        entry.name: {seed: learning_curve.frame(points) for seed, points in entry.curves.items()}
         for entry in entries
         if entry.curves
     }

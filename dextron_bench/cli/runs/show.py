@@ -180,16 +180,17 @@ def _command(entry: Entry) -> str:
 
     settings = {name: value for name, value in entry.settings.items() if value is not None}
     try:
-        flags = registry.as_flags(str(entry.code.get("class", entry.label)), settings)
+        flags = registry.as_flags(entry.code.name if entry.code else entry.label, settings)
     except registry.UnknownMethod:  # Its file lies elsewhere.
-        words = [f"--method {entry.code.get('class')}", *(registry.as_flag(*one) for one in settings.items())]
+        method = entry.code.name if entry.code else entry.label
+        words = [f"--method {method}", *(registry.as_flag(*one) for one in settings.items())]
         flags = " ".join(words)
     return f"dextron-bench run {flags} --reaches {entry.reaches} --seed {' '.join(map(str, entry.seeds))}"
 
 
 def code_of(entry: Entry) -> str:
     """The class of a run's method, and the first digits of the hash of its file if it is in a file."""
-    return " ".join(filter(None, (entry.code.get("class"), (entry.code.get("sha256") or "")[:8])))
+    return f"{entry.code.name} {(entry.code.sha256 or '')[:8]}".rstrip() if entry.code else ""
 
 
 def plain(value: Any) -> str:

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import pandas as pd
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard import highlights
 from dextron_bench.leaderboard.page import sections, standings_table
 from dextron_bench.leaderboard.page.rows import Entry, entries
@@ -43,9 +43,7 @@ DESCRIPTIONS = {
 }
 
 
-def document(
-    rows: pd.DataFrame, results: Iterable[dict[str, Any]], curves: Curves, recordings: Path, code: Code
-) -> str:
+def document(rows: pd.DataFrame, results: Iterable[Result], curves: Curves, recordings: Path, code: Code) -> str:
     """The page's HTML from the leaderboard's `rows` and a folder of recordings; equal results give equal bytes.
 
     `code` holds the paths from the page to the files of submitted agents, by method and source of reaches. The page

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.splits import strata
 from dextron_bench.splits.loading import EVALUATED, known_splits, load_split
 from dextron_bench.web.html import UNKNOWN, Html, tag
@@ -18,17 +18,17 @@ RINGS, ANGLES = range(4), range(4)
 RING_TITLES = ("ring 0, near", "ring 1", "ring 2", "ring 3, far")
 
 
-def successes(results: Iterable[dict[str, Any]]) -> dict[tuple[str, str], pd.DataFrame]:
+def successes(results: Iterable[Result]) -> dict[tuple[str, str], pd.DataFrame]:
     """Success rate of every setting (rows) for each method (columns), mean over seeds, by source and split.
 
     Further columns hold the strata of the setting. Results on another version of a split are left out.
     """
     solved: dict[tuple[str, str], dict[str, list[np.ndarray]]] = defaultdict(lambda: defaultdict(list))
     for result in results:
-        for name, split_result in result["splits"].items():
-            if _is_current(result["reaches"], name, split_result["digest"]):
-                seed = np.equal(np.asarray(split_result["scores"], float), task.SUCCESS).astype(float)
-                solved[result["reaches"], name][result["method"]].append(seed)
+        for name, played in result.splits.items():
+            if _is_current(result.reaches, name, played.digest):
+                seed = np.equal(np.asarray(played.scores, float), task.SUCCESS).astype(float)
+                solved[result.reaches, name][result.method].append(seed)
     return {key: _with_strata(key, methods) for key, methods in solved.items()}
 
 

@@ -9,11 +9,12 @@ from typing import Any
 
 import pandas as pd
 
+from dextron_bench.evaluation.declaration import Declaration
+from dextron_bench.evaluation.results import Result, Training
 from dextron_bench.methods import registry
 
 TIERS = ("self-reported", "replayed", "re-run")  # From the least to the most verified.
 QUOTED = "quoted"
-Result = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +59,7 @@ def entries(rows: pd.DataFrame, results: Iterable[Result]) -> list[Entry]:
     """An entry for each of the leaderboard's rows, in their order; the paper's entry follows the rows of its split."""
     seeds: dict[tuple[str, str], list[Result]] = defaultdict(list)
     for result in results:
-        seeds[result["method"], result["reaches"]].append(result)
+        seeds[result.method, result.reaches].append(result)
     table = [_entry(row, seeds[row["method"], row["reaches"]]) for row in rows.to_dict("records")]
     same_split = [k for k, entry in enumerate(table) if (entry.reaches, entry.split) == (PAPER.reaches, PAPER.split)]
     if same_split:
@@ -68,7 +69,7 @@ def entries(rows: pd.DataFrame, results: Iterable[Result]) -> list[Entry]:
 
 def tier(results: Sequence[Result]) -> str:
     """How far a method's results were verified: the tier of the least verified seed."""
-    tiers = [str(result.get("tier") or TIERS[0]) for result in results]
+    tiers = [result.tier or TIERS[0] for result in results]
     return min(tiers, key=lambda name: TIERS.index(name) if name in TIERS else -1, default=TIERS[0])
 
 
@@ -80,8 +81,7 @@ def role(method: str) -> str | None:
 
 
 def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
-    trainings = [result.get("training") or _declared_training(result) for result in results]
-    runs = [result["provenance"] for result in results]
+    trainings = [result.training or _declared_training(result) for result in results]
     return Entry(
         method=row["method"],
         reaches=row["reaches"],
@@ -90,9 +90,9 @@ def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
         scores=row,
         role=role(row["method"]),
         note=_trained_by(row, trainings) or _authors(results),
-        frames=_largest(training.get("frames") for training in trainings),
-        demonstrations=_largest(training.get("demonstrations") for training in trainings),
-        seconds=_largest(part.get("seconds") for part in (*trainings, *runs)),
+        frames=_largest(training.frames for training in trainings),
+        demonstrations=_largest(training.demonstrations for training in trainings),
+        seconds=_largest(part.seconds for part in (*trainings, *(result.provenance for result in results))),
         hardware=" / ".join(dict.fromkeys(filter(None, map(_hardware, results)))) or None,
         privileged=_privileged(row["method"], results),
         equal=_equal(results),
@@ -101,22 +101,21 @@ def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
 
 def _authors(results: Sequence[Result]) -> str | None:
     """Authors, notes and address of a submission, as declared."""
-    declared = next((result["declared"] for result in results if result.get("declared")), {})
-    return " · ".join(filter(None, (declared.get(name) for name in ("authors", "notes", "url")))) or None
+    declared = next((result.declared for result in results if result.declared), None)
+    return " · ".join(filter(None, (declared.authors, declared.notes, declared.url))) or None if declared else None
 
 
-def _declared_training(result: Result) -> dict[str, Any]:
-    """The training that a submission declares, with the keys of a measured one."""
-    declared = result.get("declared") or {}
-    hours = declared.get("hours")
-    counts = {name: declared.get(name) for name in ("frames", "demonstrations")}
-    return counts | {"seconds": None if hours is None else 3600.0 * hours}
+def _declared_training(result: Result) -> Training:
+    """The training that a submission declares, as a measured one."""
+    declared = result.declared or Declaration()
+    seconds = None if declared.hours is None else 3600.0 * declared.hours
+    return Training(frames=declared.frames, demonstrations=declared.demonstrations, seconds=seconds)
 
 
-def _trained_by(row: dict[Any, Any], trainings: Sequence[dict[str, Any]]) -> str | None:
+def _trained_by(row: dict[Any, Any], trainings: Sequence[Training]) -> str | None:
     """Names the method and source that trained the policy, if it is not this row's own."""
     for training in trainings:
-        label, reaches = training.get("label", row["method"]), training.get("reaches", row["reaches"])
+        label, reaches = training.label or row["method"], training.reaches or row["reaches"]
         if (label, reaches) != (row["method"], row["reaches"]):
             return f"policy of {label}, trained on {reaches}"
     return None
@@ -124,10 +123,10 @@ def _trained_by(row: dict[Any, Any], trainings: Sequence[dict[str, Any]]) -> str
 
 def _equal(results: Sequence[Result]) -> str | None:
     """How many episodes of a submission equal their replay bit for bit; None for other rows."""
-    replays = [result["replay"] for result in results if result.get("replay")]
+    replays = [result.replay for result in results if result.replay]
     if not replays:
         return None
-    equal, episodes = (sum(replay[name] for replay in replays) for name in ("equal", "episodes"))
+    equal, episodes = sum(replay.equal for replay in replays), sum(replay.episodes for replay in replays)
     return f"{equal:,} of {episodes:,} equal"
 
 
@@ -136,17 +135,17 @@ def _largest(values: Iterable[Any]) -> Any:
 
 
 def _hardware(result: Result) -> str | None:
-    if "declared" in result:
-        return str(result["declared"].get("hardware") or "") or None
-    machine = result["provenance"].get("machine") or {}
-    if not machine.get("cpu"):
+    if result.declared:
+        return result.declared.hardware or None
+    machine = result.provenance.machine
+    if not machine.cpu:
         return None
-    return f"{machine['cpu']}, {machine['cores']} cores" if machine.get("cores") else str(machine["cpu"])
+    return f"{machine.cpu}, {machine.cores} cores" if machine.cores else machine.cpu
 
 
 def _privileged(method: str, results: Sequence[Result]) -> str | None:
     """The information beyond the state that the agent received, as declared."""
-    accesses = [str(result["privileged"]) for result in results if result.get("privileged")]
-    if any((result.get("declared") or {}).get("privileged") for result in results):
+    accesses = [result.privileged for result in results if result.privileged]
+    if any(result.declared and result.declared.privileged for result in results):
         accesses.append("more than the state, as declared")
     return accesses[0] if accesses else ("each setting's expert" if method in registry.CEILINGS else None)

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard import highlights
 from dextron_bench.leaderboard.highlights import Shown
 from dextron_bench.leaderboard.page import heatmaps as page_heatmaps
@@ -48,7 +49,7 @@ def endings(rows: pd.DataFrame) -> Iterator[Html]:
         yield tag("div", _scrollable(table, title), data_reaches=reaches, data_split=split)
 
 
-def heatmaps(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> Iterator[Html]:
+def heatmaps(rows: pd.DataFrame, results: Iterable[Result]) -> Iterator[Html]:
     """Success by subject and by start region, best methods first."""
     tables = page_heatmaps.successes(results)
     for reaches, split, group in _ranking_groups(rows):
@@ -59,7 +60,7 @@ def heatmaps(rows: pd.DataFrame, results: Iterable[dict[str, Any]]) -> Iterator[
             yield tag("div", *maps, data_reaches=reaches, data_split=split)
 
 
-def tracks(results: Iterable[dict[str, Any]]) -> Iterator[Html]:
+def tracks(results: Iterable[Result]) -> Iterator[Html]:
     """Mean returns under tracks, methods by tracks."""
     for reaches, split, title, matrix in page_tracks.matrices(results):
         yield tag("div", _scrollable(matrix, title), data_reaches=reaches, data_split=split)

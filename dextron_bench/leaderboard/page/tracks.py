@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.scores import robustness
 from dextron_bench.scores.robustness import Robustness
 from dextron_bench.splits.tracks import TRACKS
@@ -13,7 +13,7 @@ from dextron_bench.web.html import UNKNOWN, Html, tag
 from dextron_bench.world import task
 
 
-def matrices(results: Iterable[dict[str, Any]]) -> Iterator[tuple[str, str, str, Html]]:
+def matrices(results: Iterable[Result]) -> Iterator[tuple[str, str, str, Html]]:
     """Source, split, title and the table of mean returns, methods by tracks, for each split that was played so."""
     rows = robustness.table(results)
     for reaches, split in dict.fromkeys((row.reaches, row.split) for row in rows):

@@ -12,10 +12,12 @@ import pandas as pd
 import pytest
 
 from dextron_bench.evaluation.diagnosis import CAUSES
+from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard import page as leaderboard_page
 from dextron_bench.scores import standings
 from dextron_bench.splits.loading import load_split
 from dextron_bench.splits.tracks import PLUS
+from tests.helpers import results
 from tests.helpers.browser import visit
 
 BOARD = Path(__file__).parents[3] / "leaderboard"
@@ -42,17 +44,20 @@ def evil(tmp_path: Path) -> str:
     return file.as_uri()
 
 
-def result(method: str) -> dict[str, Any]:
+def result(method: str) -> Result:
     split = load_split("minjerk", "test")
     scores = [20.0] * 150 + [0.0] * 50
     split_result = {"digest": split.digest, "scores": scores, "failed": 0, "closing_lag": 0.1}
     training = {"label": method + "!", "frames": 1000, "demonstrations": 12_345, "seconds": 5400.0}
-    return {
-        **{"method": method, "reaches": "minjerk", "seed": 0, "tier": "re-run", "privileged": method},
-        "splits": {"test": {**split_result, "causes": {"solved": 150, "slipped": 50}}},
-        "provenance": {"machine": {"cpu": method, "cores": 2}},
-        "training": training,
-    }
+    return results.result(
+        method,
+        reaches="minjerk",
+        splits={"test": {**split_result, "causes": {"solved": 150, "slipped": 50}}},
+        tier="re-run",
+        privileged=method,
+        provenance={"machine": {"cpu": method, "cores": 2}},
+        training=training,
+    )
 
 
 def shown(page: Any) -> list[str]:

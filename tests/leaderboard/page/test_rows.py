@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench.leaderboard.page.rows import Entry, entries
+from tests.helpers.results import result
 
 ROW = pd.DataFrame([{"method": "mine", "reaches": "synthetic", "split": "test", "return": 5.0}])
 
@@ -14,8 +15,7 @@ ROW = pd.DataFrame([{"method": "mine", "reaches": "synthetic", "split": "test", 
 def entry(seconds: float | None = None, **properties: Any) -> Entry:
     """The entry of a result with these properties, evaluated on a known machine."""
     provenance = {"machine": {"cpu": "the evaluating machine", "cores": 2}, "seconds": seconds}
-    result = {"method": "mine", "reaches": "synthetic", "seed": 0, "provenance": provenance, **properties}
-    (row,) = entries(ROW, [result])
+    (row,) = entries(ROW, [result("mine", 0, "synthetic", provenance=provenance, **properties)])
     return row
 
 

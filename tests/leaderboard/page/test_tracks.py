@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard.page import tracks
 from dextron_bench.web.html import UNKNOWN
+from tests.helpers import results as made
 
 
-def result(method: str, seed: int, **scores: list[float]) -> dict[str, Any]:
+def result(method: str, seed: int, **scores: list[float]) -> Result:
     splits = {name.replace("_", "+", 1).replace("_", "-"): {"scores": values} for name, values in scores.items()}
-    return {"method": method, "reaches": "synthetic", "seed": seed, "splits": splits}
+    return made.result(method, seed, "synthetic", splits)
 
 
 def test_cells_have_the_mean_return_and_the_loss():

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
+
+Count = Annotated[int, Meta(ge=0, le=10**15)]
+Hours = Annotated[float, Meta(ge=0.0, le=1e9)]
 
 
 @dataclass(frozen=True, slots=True)
 class Declaration:
     """What only the authors know; the leaderboard shows it unchecked."""
 
-    frames: int | None = None
+    frames: Count | None = None
     """Number of control steps in its training."""
-    demonstrations: int | None = None
+    demonstrations: Count | None = None
     """Number of expert episodes that it learned from."""
-    hours: float | None = None
+    hours: Hours | None = None
     """Hours of training."""
     hardware: str = ""
     """Hardware of the training."""
