@@ -1,18 +1,12 @@
-"""`dextron-bench leaderboard show, build, serve`: the rows of runs, the published leaderboard, and its page."""
+"""Rows of the leaderboard in print: scores, how episodes end, and tracks."""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table
-from dextron_bench.cli.support.serving import serve
-from dextron_bench.splits.tracks import PLUS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,80 +18,6 @@ INTERQUARTILE, REGRET, LAG = "interquartile mean [95 %]", "regret", "closing lag
 OPTIONAL = (INTERQUARTILE, "gap [95 %]", "fresh [95 %]", REGRET, "episodes", "seeds")  # On a narrow terminal.
 
 
-@dataclass(frozen=True)
-class Show:
-    """Print the leaderboard of the runs in a folder, and how their episodes end.
-
-    Example: dextron-bench leaderboard show --runs leaderboard/results
-    """
-
-    runs: Path = Path("runs")
-    """Folder of all runs."""
-    json: bool = False
-    """Print the rows as JSON."""
-
-    def __call__(self) -> int:
-        from dextron_bench.runs import result_files
-        from dextron_bench.scores import standings
-
-        results = list(result_files.results(self.runs))
-        rows = standings.table(results)
-        if self.json:
-            print_rows(rows, as_json=True)
-            return DONE
-        plain = rows[~rows["split"].str.contains(PLUS, regex=False)] if len(rows) else rows
-        print_rows(plain)
-        print_endings(plain)
-        print_robustness(results)
-        return DONE
-
-
-@dataclass(frozen=True)
-class Build:
-    """Build the tables, pictures and page of the published leaderboard from its results.
-
-    Example: dextron-bench leaderboard build --runs runs --into leaderboard
-    """
-
-    runs: Path | None = None
-    """A folder of finished runs to publish first: their results, learning curves and weights."""
-    into: Path = Path("leaderboard")
-    """Folder of the leaderboard."""
-
-    def __call__(self) -> int:
-        from dextron_bench.leaderboard import build, collect
-
-        if self.runs is not None:
-            print(*collect.take(self.runs, self.into), sep="\n")
-        print(*build.build(self.into), sep="\n")
-        return DONE
-
-
-@dataclass(frozen=True)
-class Serve:
-    """Serve the leaderboard's page on this machine only, with recordings in Rerun's web viewer. Ctrl-C stops it.
-
-    Example: dextron-bench leaderboard serve --port 8000
-    """
-
-    port: int = 8765
-    """The port on 127.0.0.1; 0 takes a free one."""
-    into: Path = Path("leaderboard")
-    """Folder of the leaderboard; its recordings are in the folder recordings next to it."""
-
-    def __call__(self) -> int:
-        from dextron_bench.leaderboard import server as leaderboard_server
-        from dextron_bench.recording import ViewerError, web_viewer_files
-
-        with leaderboard_server.Server(leaderboard_server.Site(self.into), self.port) as server:
-            try:
-                server.site.viewer.update(web_viewer_files())
-            except ViewerError as error:
-                print(f"dextron-bench: links download recordings, without a viewer: {error}", file=sys.stderr)
-            serve(server)
-        return DONE
-
-
 def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
     """Prints the leaderboard's rows, a table for each source of reaches and split, or JSON.
 
@@ -106,7 +26,7 @@ def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
     from dextron_bench.scores import cells
 
     if as_json:
-        print_json([{name: none_for_nan(value) for name, value in row.items()} for row in rows.to_dict("records")])
+        print_json(rows.to_dict("records"))
         return
     if rows.empty:
         print("no results yet; `dextron-bench run --method exp` makes some")
@@ -188,8 +108,3 @@ def _under_track(row: Robustness, name: str) -> str:
         return ""
     loss = row.losses[name]
     return f"{row.returns[name]:.2f}, loses {loss.mean:.2f} [{loss.low:.2f}, {loss.high:.2f}]"
-
-
-def none_for_nan(value: Any) -> Any:
-    """None for NaN, which JSON does not have; any other value unchanged."""
-    return None if value != value else value

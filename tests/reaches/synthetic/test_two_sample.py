@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from dextron_bench.cli.data.synthetic import compared, print_likeness
 
 from dextron_bench.cli import main
-from dextron_bench.cli.data.synthetic import compared, print_likeness
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.synthetic import two_sample, two_sample_held_out
