@@ -54,7 +54,7 @@ class View(EpisodeFlags):
     diff: bool = False
     """Show two places side by side."""
     live: bool = False
-    """Follow a training, or watch --method play: a name in `list`, file.py:Class, or a label with shipped weights."""
+    """Follow a training, or watch --method play: a method's name, file.py:Class, or a label with shipped weights."""
     speed: float = 1.0
     """Speed of --live, as a multiple of real time; 0 means without delay."""
     runs: flags.Runs = flags.RUNS

@@ -66,9 +66,9 @@ def fault(command: type, words: Sequence[str]) -> str:
 
 
 def parse(command: type[T], words: Sequence[str]) -> T:
-    """The command, or other dataclass, that the words give; raises SystemExit if they do not fit, and prints nothing."""
+    """The dataclass that the words give; raises SystemExit if they do not fit, and prints nothing."""
     with redirect_stderr(io.StringIO()):
-        return tyro.cli(command, args=words, console_outputs=False)
+        return tyro.cli(command, args=words)
 
 
 def _refusal(command: type, given: Sequence[tuple[Option, list[str]]]) -> str:
@@ -233,7 +233,7 @@ def _options_of(field: dataclasses.Field[Any], hint: Any) -> list[Option]:
     if field.name == FIELD:
         return []
     metadata = getattr(hint, "__metadata__", ())
-    if tyro.conf.Positional.__metadata__[0] in metadata:
+    if any(one is tyro.conf.Positional for one in metadata):
         names = [one.metavar for one in metadata if getattr(one, "metavar", None)]
         return [Option(names[0] if names else field.name.upper(), field, hint)]
     names = [name for part in metadata if (name := getattr(part, "name", None))]
