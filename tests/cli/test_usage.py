@@ -1,4 +1,4 @@
-"""Wrong arguments: one line says what is wrong; an unknown word is answered with the nearest, an old one with the new."""
+"""Wrong arguments: one line says what is wrong; an unknown word gets the nearest, an old one the new."""
 
 from __future__ import annotations
 

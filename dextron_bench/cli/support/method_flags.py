@@ -96,7 +96,7 @@ def _agent_spec(words: Sequence[str], command: Any) -> str | None:
 def _method_spec(arguments: Sequence[str]) -> str | None:
     """The value of the last --method."""
     spec = None
-    for argument, following in zip(arguments, [*arguments[1:], ""], strict=True):
+    for argument, following in zip(arguments, [*arguments[1:], ""], strict=False):
         if argument == METHOD:
             spec = following
         elif argument.startswith(f"{METHOD}="):
