@@ -19,12 +19,14 @@ from tests.helpers import tiny_benchmark
 ROOT = Path(__file__).parents[2]
 TABLES = """
 import sys
-from dextron_bench.cli import main, output
+from dextron_bench.cli import main
+from dextron_bench.cli.runs import methods
+from dextron_bench.cli.support import output
 def call(self):
     for _ in range(2):
         output.print_table("a table \\u2013 with a dash", ["a", "b"], [[1, "\\u00e9"]])
     return 0
-list.List.__call__ = call
+methods.Methods.__call__ = call
 sys.exit(main.main())
 """
 LOUD = """

@@ -78,9 +78,11 @@ def _value(flag: str, text: str, parser: type, value: str) -> Any:
     """The value that a text gives; raises BadSpace."""
     [field] = dataclasses.fields(parser)
     try:
-        words = [f"--{field.name.replace('_', '-')}", *shlex.split(value)]
+        words = shlex.split(value)
+    except ValueError as error:  # Of a quote without an end.
+        raise BadSpace(f"{flag} {text!r}: {error}") from None
+    words = [f"--{field.name.replace('_', '-')}", *words]
+    try:
         return getattr(usage.parse(parser, words), field.name)
     except SystemExit:
         raise BadSpace(f"{flag} {text!r}: {usage.fault(parser, words)}") from None
-    except ValueError as error:  # Of a quote without an end.
-        raise BadSpace(f"{flag} {text!r}: {error}") from None
