@@ -30,13 +30,13 @@ class Step:
 def _search(reaches: str, rows: int) -> Step:
     database = f"mc/{reaches}/seed0/experts-{reaches}"
     copies = tuple((database + end, f"{DATA}/experts-{reaches}{end}") for end in (".parquet", ".json"))
-    command = f"mc --reaches {reaches} --rows {rows} --seed 0 --runs {{runs}}"
+    command = f"data mc --reaches {reaches} --rows {rows} --seed 0 --runs {{runs}}"
     return Step(f"experts-{reaches}", (command,), copies=copies)
 
 
 def _splits(reaches: str) -> Step:
     """The splits of a source; the catalogue is rewritten by every source, so it is no part of what a step makes."""
-    command, needs = f"splits --reaches {reaches} --into {DATA}", ()
+    command, needs = f"data splits --reaches {reaches} --into {DATA}", ()
     if reaches != "minjerk":
         database = f"{DATA}/experts-{reaches}.parquet"
         command, needs = (
@@ -48,7 +48,7 @@ def _splits(reaches: str) -> Step:
 
 def _bottles(reaches: str) -> Step:
     """The splits under the tracks that change the bottle."""
-    command = f"splits --reaches {reaches} --bottles --into {DATA} --runs {{runs}}"
+    command = f"data splits --reaches {reaches} --bottles --into {DATA} --runs {{runs}}"
     return Step(
         f"bottles-{reaches}",
         (command,),

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from dextron_bench.cli.leaderboard.show import print_beside_published
-from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support import clusters, flags, shares
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import print_json, print_table, print_warning, progress_bar
-from dextron_bench.reaches.sources import SourceName
+from dextron_bench.cli.support.standings import print_beside_published
 
 TrackerName = Literal["rerun", "tensorboard", "trackio", "wandb"]
 
@@ -34,14 +32,11 @@ class Run:
     Example: dextron-bench run --method rlil --dur 0.1 --preset smoke --reaches synthetic --seed 0 1 2
     """
 
-    method: str = "exp"
-    """The name of a method (see `dextron-bench list`), module:Class or file.py:Class."""
+    method: flags.Method = "exp"
     all: bool = False
     """Run every method of the paper's table instead of one; --preset then applies to all methods with training."""
-    reaches: SourceName = "synthetic"
-    """The source of reaches."""
-    split: tuple[str, ...] = ()
-    """The splits to evaluate on; by default all splits that rank methods."""
+    reaches: flags.Reaches = "synthetic"
+    split: flags.EvalSplits = ()
     track: tuple[str, ...] = ()
     """Also evaluate on these splits under tracks, such as delay-100 or sensing-1 (docs/splits.md)."""
     seed: tuple[int, ...] = (0,)
@@ -52,23 +47,20 @@ class Run:
     """Show the training in these trackers while it runs (docs/following.md)."""
     live: bool = False
     """Show the training in Rerun's viewer while it runs."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
+    runs: flags.Runs = flags.RUNS
     cluster: clusters.Flag = ""
     """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
     depend on it."""
-    device: Literal["cpu", "cuda", "auto"] = "cpu"
-    """The device for training; auto uses a GPU if there is one. The last bits of the weights depend on it."""
+    device: flags.Device = "cpu"
     share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
     """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
     merge: bool = False
     """Only put together what shares have done; if anything is missing, this is an error that names it."""
     dry_run: bool = False
     """Only print what is left to do and an estimate of the time."""
-    quiet: bool = False
-    """Show no progress."""
+    quiet: flags.Quiet = False
     json: bool = False
     """Print the rows as JSON."""
     method_settings: tyro.conf.Suppress[Any] = None

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.leaderboard.show import print_rows
-from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support import clusters, flags, shares
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
+from dextron_bench.cli.support.method_flags import changed_settings
 from dextron_bench.cli.support.output import progress_bar
-from dextron_bench.reaches.sources import RankedSource
+from dextron_bench.cli.support.standings import print_rows
 from dextron_bench.submissions.declaration import Declaration
 
 if TYPE_CHECKING:
@@ -27,7 +27,8 @@ class Submit:
     """Play every episode that ranks methods with an agent in a separate process, and write one bundle (a zip).
 
     AGENT is the name of a method, module:Class, file.py:Class, FILE.pt (TorchScript), FILE.onnx, or 'exec:COMMAND' for
-    a program that implements the protocol. The same command continues an interrupted submission.
+    a program that implements the protocol. The settings of a class are flags too, after
+    its name, as for `run`. The same command continues an interrupted submission.
 
     Example: dextron-bench submit my_agent/agent.py:MyAgent --name my-agent
     """
@@ -36,8 +37,7 @@ class Submit:
     """The agent; see above for its forms."""
     name: str
     """The name of its row on the leaderboard."""
-    reaches: RankedSource = "synthetic"
-    """The source of reaches."""
+    reaches: flags.RankedReaches = "synthetic"
     seed: tuple[int, ...] = (0, 1, 2)
     """Seeds of the agent; one is enough if the agent uses no random numbers."""
     weights: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
@@ -54,8 +54,7 @@ class Submit:
     """Memory limit of the agent [GiB]."""
     trust: bool = False
     """Run a policy's file (TorchScript, ONNX) even without a sandbox, with all your rights."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
+    runs: flags.Runs = flags.RUNS
     board: Path = Path("leaderboard")
     """Folder of the leaderboard; the printed table has its methods too. Without it: the published leaderboard."""
     cluster: clusters.Flag = ""
@@ -67,10 +66,8 @@ class Submit:
     """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
     merge: bool = False
     """Only put together what shares have done; if anything is missing, this is an error that names it."""
-    quiet: bool = False
-    """Show no progress."""
-    settings: str = "{}"
-    """Settings of a method or class as JSON, such as '{"near": 0.05}'."""
+    quiet: flags.Quiet = False
+    method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
         from dextron_bench.methods.isolation.isolated_agent import Limits
@@ -116,7 +113,7 @@ class Submit:
         from dextron_bench.submissions import entry as submission_entry
 
         seeds = tuple(dict.fromkeys(self.seed))
-        settings = submission_entry.settings_from_json(self.agent, self.settings, self.reaches)
+        settings = submission_entry.whole_settings(self.agent, changed_settings(self.method_settings), self.reaches)
         return submission_entry.Entry(
             self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared, self.trust
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.episode_flags import EpisodeFlags
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import print_table, print_warning, progress_bar
@@ -53,19 +54,17 @@ class View(EpisodeFlags):
     diff: bool = False
     """Show two places side by side."""
     live: bool = False
-    """Follow a training, or watch --method play: a name in `list`, file.py:Class, or a label with shipped weights."""
+    """Follow a training, or watch --method play: a method's name, file.py:Class, or a label with shipped weights."""
     speed: float = 1.0
     """Speed of --live, as a multiple of real time; 0 means without delay."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
+    runs: flags.Runs = flags.RUNS
     web: bool = False
     """Open the recordings in the browser; no screen and no GPU is needed here."""
     port: int = 8767
     """With --web: the port on 127.0.0.1; 0 takes a free one."""
     print: bool = False
     """Print the names of the files, one in each line, instead of opening them; works without a display."""
-    quiet: bool = False
-    """Show no progress."""
+    quiet: flags.Quiet = False
 
     def __call__(self) -> int:
         from dextron_bench import recording

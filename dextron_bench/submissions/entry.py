@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -21,25 +20,14 @@ class BadSubmission(ValueError):
     """An entry that cannot be submitted; the message says what is wrong."""
 
 
-def settings_from_json(spec: str, text: str, reaches: str) -> dict[str, Any]:
-    """An agent's settings from a JSON object; raises BadSubmission, BadSettings.
+def whole_settings(spec: str, settings: dict[str, Any], reaches: str) -> dict[str, Any]:
+    """An agent's settings; those of an installed method with its defaults for the source of reaches.
 
-    An installed method gets all its settings, with the defaults for the source of reaches.
+    Raises BadSettings.
     """
-    settings = _json_object(text)
     if spec in registry.installed_methods():
         return registry.settings_of(registry.create(spec, settings, reaches))
     return settings
-
-
-def _json_object(text: str) -> dict[str, Any]:
-    try:
-        value = json.loads(text)
-    except ValueError as error:
-        raise BadSubmission(f"--settings is not valid JSON ({error})") from error
-    if not isinstance(value, dict):
-        raise BadSubmission("--settings takes a JSON object, such as '{\"near\": 0.05}'")
-    return value
 
 
 @dataclass(frozen=True, slots=True)

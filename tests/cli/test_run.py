@@ -42,7 +42,7 @@ def test_a_run_trains_all_seeds_together(
     assert (training["seeds"], training["epochs"], training["best_epoch"], training["frames"]) == ([0, 1], 2, 2, 40)
     assert training["sha256"] == hashing.sha256(base / "seed1" / "weights.safetensors")
     assert [point["epoch"] for point in json.loads((base / "seed1" / "curve.json").read_text())["points"]] == [2]
-    assert main.main(["list"]) == 0
+    assert main.main(["runs", "list"]) == 0
     assert "toy-0.3" in capsys.readouterr().out
 
 
@@ -86,7 +86,7 @@ def test_a_dry_run_prints_what_is_left_and_writes_nothing(
     assert main.main([*run(TOY, "--breaks", "2", "--every", "1")]) == 2
     train, _ = printed_json(*run(TOY, "--breaks", "2", "--every", "1"), "--dry-run")
     assert train["left"] == "1 of 2 epochs"
-    assert main.main(["list"]) == 0
+    assert main.main(["runs", "list"]) == 0
     assert "1 of 2 epochs" in capsys.readouterr().out
     assert main.main(words[:-1]) == 2  # The folder has a run with other settings.
     assert main.main([*run(TOY, "--runs", "other")]) == 0

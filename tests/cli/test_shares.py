@@ -231,7 +231,7 @@ def test_a_share_trains_nothing(here: Path, monkeypatch: pytest.MonkeyPatch, com
 def test_shares_verify_a_board_as_one_process_does(here: Path, capsys: pytest.CaptureFixture[str]):
     for method in ("exp", "nothing"):
         play(("run", "--method", method, "--quiet", "--record", "0"))
-    assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
+    assert main.main(["leaderboard", "build", "--runs", "runs", "--board", "board"]) == 0
     result = here / "board/results/nothing/synthetic/seed0/result.json"
     result.write_text(result.read_text().replace("0.0", "1.0", 1))
     words = ["leaderboard", "verify", "--all", "--board", "board", "--quiet", "--threads", "1"]

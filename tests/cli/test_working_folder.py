@@ -29,7 +29,9 @@ MORE = {  # Words with which a command starts processes, or reads what lies in t
     "check": (["mine.py:Mine"],),
     "leaderboard": (["build"], ["serve", "--port", "0"]),
     "recordings": (["list", "one.rrd"], ["export", "one.rrd", "--into", "one.gif"]),
-    "list": ([],),
+    "runs": (["list"], ["methods"]),
+    "sweep": ([], ["cross-validate", "--method", "nothing"]),
+    "data": (["splits"], ["mc"]),
     "doctor": ([],),
 }
 AGENT = """

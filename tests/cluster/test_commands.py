@@ -55,7 +55,7 @@ def play(*words: str | Path) -> None:
 
 
 def test_a_search_and_a_run_have_the_same_bytes(here: Path):
-    for words in (("mc", "--rows", "3"), ("run", "--method", "exp", "--split", "test")):
+    for words in (("data", "mc", "--rows", "3"), ("run", "--method", "exp", "--split", "test")):
         play(*words, "--quiet", "--threads", "1", "--runs", "whole")
         play(*words, "--quiet", *CLUSTER)
     files = contents(here / "whole")
@@ -105,7 +105,7 @@ def test_a_submission_is_the_same_bundle(here: Path, complaint: Callable[..., st
 def test_a_board_is_verified_as_without_a_cluster(here: Path, capsys: pytest.CaptureFixture[str]):
     for method in ("exp", "nothing"):
         play("run", "--method", method, "--quiet", "--record", "0")
-    play("leaderboard", "build", "--runs", "runs", "--into", "board")
+    play("leaderboard", "build", "--runs", "runs", "--board", "board")
     result = here / "board/results/nothing/synthetic/seed0/result.json"
     result.write_text(result.read_text().replace("0.0", "1.0", 1))
     words = ["leaderboard", "verify", "--all", "--board", "board", "--quiet", "--threads", "1"]

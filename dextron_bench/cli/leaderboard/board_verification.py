@@ -15,12 +15,12 @@ from dextron_bench.leaderboard.verify_board import Row
 from dextron_bench.storage.printable import printable_line
 
 if TYPE_CHECKING:
-    from dextron_bench.cli.leaderboard.verify import Verify
+    from dextron_bench.cli.support.verification_flags import BoardFlags
 
 SHOWN = 5  # How many problems of a row are printed.
 
 
-def verify_share(flags: Verify, share: shares.Share) -> int:
+def verify_share(flags: BoardFlags, share: shares.Share) -> int:
     """Verifies the rows of a share and stores what it finds; returns the exit code."""
     pieces, rows = _pieces(flags), board.rows(flags.board, flags.method, flags.reaches)
     mine = [row for place, row in enumerate(rows) if share.has(place)]
@@ -31,7 +31,7 @@ def verify_share(flags: Verify, share: shares.Share) -> int:
     return shares.print_done(share, f"{len(mine)} of {len(rows)} rows", pieces.folder)
 
 
-def verify_board(flags: Verify) -> int:
+def verify_board(flags: BoardFlags) -> int:
     """Verifies every row, or with --merge takes the findings of shares, and prints them; returns the exit code."""
     sound, pieces = True, _pieces(flags)
     rows = board.rows(flags.board, flags.method, flags.reaches)
@@ -60,7 +60,7 @@ def verify_board(flags: Verify) -> int:
     return DONE if sound and not problems else DIFFERS
 
 
-def _check_on_cluster(flags: Verify, pieces: FindingPieces, rows: list[Row]) -> None:
+def _check_on_cluster(flags: BoardFlags, pieces: FindingPieces, rows: list[Row]) -> None:
     from dextron_bench.cluster import verifications
 
     with (
@@ -70,10 +70,10 @@ def _check_on_cluster(flags: Verify, pieces: FindingPieces, rows: list[Row]) -> 
         verifications.check(cluster, pieces, rows, flags.runs, progress)
 
 
-def _check(flags: Verify, row: Row) -> Finding:
+def _check(flags: BoardFlags, row: Row) -> Finding:
     with progress_bar(row.name, flags.quiet) as progress:
         return board.check(row, flags.board, flags.rows, flags.redraw, flags.threads, progress)
 
 
-def _pieces(flags: Verify) -> FindingPieces:
+def _pieces(flags: BoardFlags) -> FindingPieces:
     return FindingPieces(flags.runs / "verify", flags.board, {"rows": flags.rows, "redraw": flags.redraw})

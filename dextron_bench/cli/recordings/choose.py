@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_table
 from dextron_bench.reaches.sources import SourceName
@@ -28,8 +29,7 @@ class Choose:
     """The split of the episodes."""
     rows: int = 100
     """How many rows of the split to choose from, from the first."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
+    runs: flags.Runs = flags.RUNS
 
     def __call__(self) -> int:
         from dextron_bench.leaderboard import highlights

@@ -18,7 +18,7 @@ import pandas as pd
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.cli.data.synthetic import compared, print_likeness
+from dextron_bench.cli.data.likeness import print_likeness
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.synthetic import two_sample, two_sample_held_out
@@ -32,6 +32,7 @@ from dextron_bench.reaches.synthetic.two_sample_features import (
     single_feature_aucs,
     summaries,
 )
+from tools.fit_synthetic import compared
 
 STUDY = """
 import sys
@@ -227,7 +228,7 @@ def test_a_single_feature_shows_a_change_of_duration(reaches: list[Reach]):
 def test_fit_reproduces_the_shipped_model(release: Path, tmp_path: Path):
     """Numbers agree except for rounding, and except for the signs of components, which are arbitrary."""
     file = tmp_path / "new" / "model.npz"
-    done = shell(["-m", "dextron_bench", "data", "fit", "--into", str(file)], tmp_path, DEXTRON_DATA=str(release))
+    done = shell(["-m", "tools.fit_synthetic", "--into", str(file)], tmp_path, DEXTRON_DATA=str(release))
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"{file}: {file.stat().st_size:,} bytes, ")
     assert "shipped file" in done.stdout

@@ -5,32 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dextron_bench.cli.compare import DIFFERENCE, HOLM, difference_text
-from dextron_bench.cli.support.exit_codes import DONE
+from dextron_bench.cli.compare.cells import DIFFERENCE, HOLM, difference_text
 from dextron_bench.cli.support.output import print_json, print_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dextron_bench.cli.compare import Compare
     from dextron_bench.scores.comparison import SeedScores
 
 
-def compare(command: Compare, methods: Sequence[SeedScores]) -> int:
+def print_pairs(methods: Sequence[SeedScores], as_json: bool) -> None:
     """Compares all pairs of methods on the same settings and prints them."""
     from dextron_bench.scores import comparison
 
     pairs = comparison.pairs(methods)
-    if command.json:
+    if as_json:
         about = {"reaches": methods[0].reaches, "split": methods[0].split, "digest": methods[0].digest}
         seeds = {method.name: len(method.scores) for method in methods}
         print_json({**about, "seeds": seeds, "pairs": pairs.to_dict("records")})
     else:
-        _print_pairs(methods, pairs)
-    return DONE
+        _print_table(methods, pairs)
 
 
-def _print_pairs(methods: Sequence[SeedScores], pairs: pd.DataFrame) -> None:
+def _print_table(methods: Sequence[SeedScores], pairs: pd.DataFrame) -> None:
     """Each method with its number of seeds, and each pair with its difference and p values."""
     from dextron_bench.scores import cells
     from dextron_bench.scores.paired import SIGNIFICANT

@@ -1,17 +1,17 @@
-"""`dextron-bench cross-validate`: trains a method without each subject in turn, and evaluates it on that subject."""
+"""`dextron-bench sweep cross-validate`: trains a method without each subject in turn, and evaluates it on that one."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import print_json, print_markdown, print_table, progress_bar
-from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,25 +29,20 @@ class CrossValidate:
     The snapshot of a training is chosen on the rows of `val` of the other subjects. No other split is played. The
     settings of the method are flags, as for `run`. The same command continues after an interruption.
 
-    Example: dextron-bench cross-validate --method stopping --reaches real --seed 0 1 2
+    Example: dextron-bench sweep cross-validate --method stopping --reaches real --seed 0 1 2
     """
 
-    method: str
-    """The name of a method (see `dextron-bench list`), module:Class or file.py:Class."""
+    method: flags.Method
     beside: tuple[str, ...] = ("reflex",)
     """Methods with their default settings, for further columns; those that do not learn play with the first seed."""
     seed: tuple[int, ...] = (0,)
     """Seeds of the agent."""
-    reaches: SourceName = "synthetic"
-    """The source of reaches."""
+    reaches: flags.Reaches = "synthetic"
     runs: Path = Path("runs")
     """Folder of all runs; the runs without a subject are below its folder `without`."""
-    threads: int = 0
-    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
-    device: Literal["cpu", "cuda", "auto"] = "cpu"
-    """The device for training; auto uses a GPU if there is one. The last bits of the weights depend on it."""
-    quiet: bool = False
-    """Show no progress."""
+    threads: flags.Threads = 0
+    device: flags.Device = "cpu"
+    quiet: flags.Quiet = False
     markdown: bool = False
     """Print the table as Markdown, for a document."""
     json: bool = False

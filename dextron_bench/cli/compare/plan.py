@@ -1,14 +1,14 @@
-"""`dextron-bench plan`: how many settings and seeds show a difference between two methods."""
+"""`dextron-bench compare plan`: how many settings and seeds show a difference between two methods."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table
 from dextron_bench.reaches.sources import SourceName
@@ -26,9 +26,9 @@ class Plan:
 
     The noise comes from results of two methods like those that will be compared; docs/statistics.md has the formula.
 
-    Example: dextron-bench plan bc rlil-0.1 --reaches real
+    Example: dextron-bench compare plan bc rlil-0.1 --reaches real
 
-    Example: dextron-bench plan reflex runs/mine/synthetic --measure return --difference 0.5 --seeds 3 6
+    Example: dextron-bench compare plan reflex runs/mine/synthetic --measure return --difference 0.5 --seeds 3 6
     """
 
     a: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="A")]
@@ -45,8 +45,7 @@ class Plan:
     """The split that both played."""
     reaches: SourceName | None = None
     """The source of reaches; needed only if both have results on several."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
+    runs: flags.Runs = flags.RUNS
     json: bool = False
     """Print JSON."""
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import shlex
 import typing
 from collections.abc import Mapping, Sequence
-from contextlib import redirect_stderr
 from typing import Any
 
 import tyro
@@ -79,12 +77,12 @@ def _hints(cls: type) -> Mapping[str, Any]:
 def _value(flag: str, text: str, parser: type, value: str) -> Any:
     """The value that a text gives; raises BadSpace."""
     [field] = dataclasses.fields(parser)
-    message = io.StringIO()
     try:
-        with redirect_stderr(message):
-            return getattr(
-                tyro.cli(parser, args=[f"--{field.name.replace('_', '-')}", *shlex.split(value)]), field.name
-            )
-    except (SystemExit, ValueError) as error:  # A ValueError is of a quote without an end.
-        why = usage.one_line(message.getvalue()) or str(error)
-        raise BadSpace(f"{flag} {text!r}: {why}") from None
+        words = shlex.split(value)
+    except ValueError as error:  # Of a quote without an end.
+        raise BadSpace(f"{flag} {text!r}: {error}") from None
+    words = [f"--{field.name.replace('_', '-')}", *words]
+    try:
+        return getattr(usage.parse(parser, words), field.name)
+    except SystemExit:
+        raise BadSpace(f"{flag} {text!r}: {usage.fault(parser, words)}") from None

@@ -1,86 +1,16 @@
-"""`dextron-bench data fit` and `data likeness`: fits the model of synthetic reaches and tests their realism."""
+"""`dextron-bench data likeness`: tests how like recorded reaches the synthetic ones are."""
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import tyro
-
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
-from dextron_bench.storage import home
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-class BadSeed(ValueError):
-    """The seed is negative."""
-
-    def __init__(self, seed: int) -> None:
-        super().__init__(f"a seed must be 0 or more, not {seed}")
-
-
-@dataclass(frozen=True)
-class Fit:
-    """Fit the model of synthetic reaches to the recorded ones again, and compare it with the shipped model.
-
-    Example: dextron-bench data fit --into synthetic-reaches.npz
-    """
-
-    seed: int = 0
-    """Seed of the fit; the shipped model has seed 0."""
-    into: Annotated[Path, tyro.conf.arg(metavar="FILE.npz")] = Path("synthetic-reaches.npz")
-    """The file for the parameters."""
-    quiet: bool = False
-    """Show no progress."""
-
-    def __call__(self) -> int:
-        from importlib.resources import files
-
-        from dextron_bench.reaches.recorded import cache
-        from dextron_bench.reaches.synthetic import fitting, parameters
-        from dextron_bench.storage import atomic
-
-        if self.seed < 0:
-            raise BadSeed(self.seed)
-        shipped = files("dextron_bench").joinpath("data/synthetic-reaches.npz").read_bytes()
-        with progress_bar("models fitted", self.quiet) as progress, TemporaryDirectory() as folder:
-            model = fitting.fit(cache.load_reaches(), self.seed)
-            progress(1, 1)
-            file = Path(folder) / "model.npz"
-            parameters.save(model, file)
-            content = file.read_bytes()
-        into = home.expanded(self.into)
-        atomic.write_atomically(into, lambda part: part.write_bytes(content))
-        print(f"{into}: {len(content):,} bytes, {compared(content, shipped)}")
-        return DONE
-
-
-def compared(content: bytes, shipped: bytes) -> str:
-    """How a file of parameters differs from the shipped one, as text."""
-    import numpy as np
-
-    if content == shipped:
-        return "byte for byte the shipped file"
-    with np.load(io.BytesIO(content)) as new, np.load(io.BytesIO(shipped)) as old:
-        pairs = {name: (new[name].astype(float), old[name].astype(float)) for name in old.files}
-    if other := [name for name, (a, b) in pairs.items() if a.shape != b.shape]:
-        return f"not the shipped file: {', '.join(other)} have another shape"
-    total = sum(a.size for a, _ in pairs.values())
-    differ = sum(int((a != b).sum()) for a, b in pairs.values())
-    if not differ:
-        return "all numbers are as in the shipped file, but the bytes differ"
-    distances = {name: float(abs(a - b).max() / abs(b).max()) for name, (a, b) in pairs.items()}
-    worst = max(distances, key=distances.__getitem__)
-    return (
-        f"not the shipped file: {differ:,} of {total:,} numbers differ, by at most {distances[worst]:.1g} of the "
-        f"largest in their array ({worst})"
-    )
 
 
 @dataclass(frozen=True)
@@ -94,15 +24,12 @@ class Likeness:
     """Seed of folds, fits, forests and intervals."""
     json: bool = False
     """Print JSON: lists of rows by table, with all start regions and classifiers."""
-    quiet: bool = False
-    """Show no progress."""
+    quiet: flags.Quiet = False
 
     def __call__(self) -> int:
         from dextron_bench.reaches.recorded import cache
         from dextron_bench.reaches.synthetic import two_sample
 
-        if self.seed < 0:
-            raise BadSeed(self.seed)
         with progress_bar("models and classifiers", self.quiet) as progress:
             tables = two_sample.study(cache.load_reaches(), self.seed, progress)
         if self.json:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from dextron_bench.cli.support import flags
 from dextron_bench.reaches.sources import RankedSource
 
 if TYPE_CHECKING:
@@ -20,12 +20,9 @@ class BaselineFlags:
     """Only the rows of these methods."""
     reaches: tuple[RankedSource, ...] = get_args(RankedSource)
     """Only rows on these sources; `real` needs the recorded reaches."""
-    board: Path = Path("leaderboard")
-    """Folder of the leaderboard."""
-    threads: int = 0
-    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
-    quiet: bool = False
-    """Show no progress."""
+    board: flags.Board = flags.BOARD
+    threads: flags.Threads = 0
+    quiet: flags.Quiet = False
 
     def baselines(self) -> dict[str, list[Row]]:
         """The selected rows of baselines, by source; submissions are played by their authors.

@@ -1,4 +1,4 @@
-"""`dextron-bench success data` and `success train`: the data set of the success model, and its training."""
+"""`dextron-bench success data`: the data set of the success model."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support import clusters, flags, shares
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
-from dextron_bench.reaches.sources import RankedSource
+from dextron_bench.cli.support.success_models import folder_of
 
 if TYPE_CHECKING:
     from dextron_bench.success.generation import DatasetConfig
@@ -26,11 +26,10 @@ class Data:
     Example: dextron-bench success data --reaches synthetic --policies runs/*/synthetic/seed*/weights.safetensors
     """
 
-    reaches: RankedSource = "synthetic"
-    """The source of reaches."""
+    reaches: flags.RankedReaches = "synthetic"
     rows: int = 1_000_000
     """Play until there are this many transitions."""
-    policies: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.safetensors")] = ()
+    policies: flags.Policies = ()
     """Weights of the policies that play half of the episodes, in turn; by default experts play all episodes."""
     seed: int = 0
     """Seed of all draws."""
@@ -44,8 +43,7 @@ class Data:
     """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
     merge: bool = False
     """Only put together what shares have done; if anything is missing, this is an error that names it."""
-    quiet: bool = False
-    """Show no progress."""
+    quiet: flags.Quiet = False
     json: bool = False
     """Print the summary as JSON."""
 
@@ -91,45 +89,3 @@ class Data:
             progress_bar("transitions", self.quiet) as progress,
         ):
             datasets.play_blocks(cluster, config, folder, self.runs, self.rows, policies, progress)
-
-
-@dataclass(frozen=True)
-class Train:
-    """Train the success model on a data set of `success data`; a fifth of the settings is held out.
-
-    If it is interrupted, the same command continues and gives the same bytes.
-
-    Example: dextron-bench success train --reaches synthetic --epochs 30
-    """
-
-    reaches: RankedSource = "synthetic"
-    """The source of reaches."""
-    data: int = 0
-    """Seed of the data set."""
-    epochs: int = 30
-    """Number of epochs; an epoch has 1,000 batches."""
-    seed: int = 0
-    """Seed of the network and of its batches."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
-    quiet: bool = False
-    """Show no progress."""
-
-    def __call__(self) -> int:
-        from dextron_bench.storage import tensors
-        from dextron_bench.success import training
-
-        folder = folder_of(self.runs, self.reaches, self.data)
-        with progress_bar("epochs", self.quiet) as progress:
-            training.train(folder, training.TrainingConfig(epochs=self.epochs, seed=self.seed), progress)
-        training_info = tensors.read_about(folder / training.MODEL)
-        best = training_info["curve"][training_info["best_epoch"] - 1]
-        columns = ["epoch", "loss", "accuracy", "test_loss", "test_accuracy"]
-        print_table("the best epoch on held-out settings", columns, [[best[column] for column in columns]])
-        print(folder / training.MODEL)
-        return DONE
-
-
-def folder_of(runs: Path, reaches: str, seed: int) -> Path:
-    """The folder of a data set and of the model that is trained on it."""
-    return runs / "success" / reaches / f"seed{seed}"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from dextron_bench.cli.compare import pairs
+from dextron_bench.cli.compare.cells import DIFFERENCE, HOLM, difference_text
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import print_json, print_table
 from dextron_bench.reaches.sources import SourceName
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from dextron_bench.scores.comparison import Comparison
     from dextron_bench.scores.paired import Difference
 
-DIFFERENCE = "B - A [95 %]"
-HOLM = "p (Holm)"  # The heading of p values that are corrected for their number.
 SHOWN = 5  # How many settings are listed that more seeds of B solve, and that fewer do.
 
 
@@ -54,9 +53,8 @@ class Compare:
     """The split that all played."""
     reaches: SourceName | None = None
     """The source of reaches; needed only if the methods have results on several."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
-    into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
+    runs: flags.Runs = flags.RUNS
+    into: flags.Picture = None
     """Also draw the differences into this file."""
     fail_if_worse: bool = False
     """Exit with code 1 if B is worse beyond noise: if the whole interval of the difference B - A is below 0."""
@@ -73,9 +71,8 @@ class Compare:
         results = [result_files.find(name, self.runs, self.split) for name in names]
         methods = comparison.align_all(names, results, self.split, self.reaches)
         if self.others:
-            from dextron_bench.cli import compare_pairs
-
-            return compare_pairs.compare(self, methods)
+            pairs.print_pairs(methods, self.json)
+            return DONE
         result = comparison.compare(*methods)
         if self.into is not None:
             from dextron_bench.scores.figures import differences
@@ -151,8 +148,3 @@ def _difference_cells(difference: Difference, unit: float) -> tuple[str, str]:
     scaled = {"difference": difference.mean, "low": difference.low, "high": difference.high}
     text = difference_text({name: unit * value for name, value in scaled.items()})
     return text, f"{unit * difference.detectable:.2f}"
-
-
-def difference_text(row: Mapping[Any, Any]) -> str:
-    """The entries `difference`, `low` and `high` of a row, with two digits."""
-    return f"{row['difference']:+.2f} [{row['low']:+.2f}, {row['high']:+.2f}]"

@@ -1,4 +1,4 @@
-"""`dextron-bench mc`: searches for experts by Monte Carlo sampling."""
+"""`dextron-bench data mc`: searches for experts by Monte Carlo sampling."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support import clusters, flags, shares
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
-from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     from dextron_bench.experts import montecarlo
@@ -23,11 +22,10 @@ class MonteCarlo:
 
     If the search is interrupted, the same command continues it and gives the same rows.
 
-    Example: dextron-bench mc --reaches real --rows 10000 --seed 0
+    Example: dextron-bench data mc --reaches real --rows 10000 --seed 0
     """
 
-    reaches: SourceName = "synthetic"
-    """The source of reaches."""
+    reaches: flags.Reaches = "synthetic"
     rows: int = 1000
     """Search until this many rows have the full return of 20."""
     seed: int = 0
@@ -44,8 +42,7 @@ class MonteCarlo:
     """Start from the shipped database of this source of reaches, not from an empty one."""
     runs: Path = Path("runs")
     """Folder of all runs; also holds the files of the search."""
-    quiet: bool = False
-    """Show no progress."""
+    quiet: flags.Quiet = False
     json: bool = False
     """Print the summary as JSON."""
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from dextron_bench.cli.support import clusters
+from dextron_bench.cli.support import clusters, flags
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
-from dextron_bench.cli.sweep_output import in_words
-from dextron_bench.reaches.sources import SourceName
+from dextron_bench.cli.sweep.output import in_words
 
 if TYPE_CHECKING:
     from dextron_bench.sweeps.sweep import Sweep as Question
@@ -36,8 +34,7 @@ class Sweep:
     Example: dextron-bench sweep --method rl --preset quick --grid hold=1,20,40 --seed 0 1 2 --cluster local
     """
 
-    method: str = ""
-    """The name of a method (see `dextron-bench list`), module:Class or file.py:Class."""
+    method: flags.Method = ""
     grid: tuple[str, ...] = ()
     """Settings with values, such as near=0.04,0.06 hold=1,20: every combination is a trial."""
     search: tuple[str, ...] = ()
@@ -52,8 +49,7 @@ class Sweep:
     """Stop a training early when its curve on `val` is below the median of at least five trials (extra `sweep`)."""
     seed: tuple[int, ...] = (0,)
     """Seeds of the agent; a trial counts with the mean of all."""
-    reaches: SourceName = "synthetic"
-    """The source of reaches."""
+    reaches: flags.Reaches = "synthetic"
     name: str = ""
     """The name of the sweep; by default the method's name and a hash of what is asked."""
     show: bool = False
@@ -61,16 +57,12 @@ class Sweep:
     cluster: clusters.Flag = ""
     """Do the trials of a grid or a random search side by side on a cluster with Ray: on this machine, on the cluster it
     belongs to, or on another one."""
-    into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
+    into: flags.Picture = None
     """Also draw the scores on `val` against the setting that varies, which has numbers, into this file."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
-    threads: int = 0
-    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
-    device: Literal["cpu", "cuda", "auto"] = "cpu"
-    """The device for training; auto uses a GPU if there is one. The last bits of the weights depend on it."""
-    quiet: bool = False
-    """Show no progress."""
+    runs: flags.Runs = flags.RUNS
+    threads: flags.Threads = 0
+    device: flags.Device = "cpu"
+    quiet: flags.Quiet = False
     json: bool = False
     """Print what the sweep's file holds as JSON."""
     method_settings: tyro.conf.Suppress[Any] = None
@@ -122,7 +114,7 @@ class Sweep:
 
     def _question(self) -> Question:
         """What the flags ask."""
-        from dextron_bench.cli import sweep_space
+        from dextron_bench.cli.sweep import space as sweep_space
         from dextron_bench.sweeps.sweep import BadSweep, Sweep
 
         space = sweep_space.parse(self.method_settings, self.grid, self.search)
@@ -137,7 +129,7 @@ class Sweep:
 
     def _print(self, file: SweepFile) -> int:
         """Prints a sweep; the exit code says whether the agent raised errors."""
-        from dextron_bench.cli import sweep_output
+        from dextron_bench.cli.sweep import output as sweep_output
         from dextron_bench.sweeps.trial import FAILED, Trial
 
         content = file.read()
