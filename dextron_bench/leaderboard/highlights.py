@@ -49,11 +49,11 @@ class Shown:
         return f"../{FOLDER}/{quote(self.file)}"
 
 
-def choose(runs: Path, reaches: Sequence[str], split: str, rows: int) -> pd.DataFrame:
+def choose(runs: Path, reaches: Sequence[str], split: str, rows: int, methods: Sequence[str] = ()) -> pd.DataFrame:
     """The episodes to show from the first rows of a split in a folder of runs, with a `name` for each.
 
-    Each method is shown on the first of the sources `reaches` that it played, at its lowest seed. Raises
-    NoEpisodes, DamagedFile, MissingData.
+    Each method, or each of `methods`, is shown on the first of the sources `reaches` that it played, at its lowest
+    seed; exemplars are of any method. Raises NoEpisodes, DamagedFile, MissingData.
     """
     table = selection.episodes([runs])
     table = table.assign(actions=table.get("actions"))  # Runs of earlier versions did not keep actions.
@@ -68,7 +68,8 @@ def choose(runs: Path, reaches: Sequence[str], split: str, rows: int) -> pd.Data
         )
     by_source = {name: table[table["reaches"] == name] for name in reaches}
     cases = [case for name, group in by_source.items() if len(group) for case in _exemplars(group, name, split)]
-    return pd.concat([*_shortest(table), *cases], ignore_index=True).drop_duplicates("name")
+    shown = table[table["method"].isin(methods)] if methods else table
+    return pd.concat([*_shortest(shown), *cases], ignore_index=True).drop_duplicates("name")
 
 
 def record_outcomes(run: Path, name: str, reaches: str, into: Path) -> list[Path]:
