@@ -9,7 +9,7 @@ from string import Template
 import pandas as pd
 
 from dextron_bench.catalogue.browse.search import ORDERS, Search
-from dextron_bench.catalogue.episode_catalogue import COLUMNS, STATE
+from dextron_bench.catalogue.episodes import COLUMNS, STATE
 from dextron_bench.catalogue.expressions import BadExpression
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.web.html import Html, join, style, tag
@@ -45,8 +45,8 @@ def document(episodes: pd.DataFrame, search: Search, token: str, target: str, no
 
 def _style() -> Html:
     """The style of all pages, and what this page adds."""
-    own = files("dextron_bench.catalogue.browse") / "page.css"
-    return Html(style() + own.read_text(encoding="utf-8"))
+    additions = files("dextron_bench.catalogue.browse") / "page.css"
+    return Html(style() + additions.read_text(encoding="utf-8"))
 
 
 def _facts(episodes: pd.DataFrame) -> Html:

@@ -38,10 +38,10 @@ class Choose:
 
         chosen = highlights.choose(self.runs, self.reaches, self.split, self.rows, self.method)
         files = highlights.make(chosen, self.into)
-        columns = ["method", "row", "score", "length", "cause"]
+        columns = ["method", "row", "return", "steps", "cause"]
         cells = [
             [file.name, *row, round(file.stat().st_size / 1000)]
             for file, row in zip(files, chosen[columns].itertuples(index=False), strict=True)
         ]
-        print_table(f"recordings in {self.into}", ["file", "method", "row", "return", "steps", "cause", "kB"], cells)
+        print_table(f"recordings in {self.into}", ["file", *columns, "kB"], cells)
         return DONE

@@ -51,7 +51,7 @@ class List:
         known = run_catalogue.entries(self.runs)
         if self.split != SPLIT:
             run_search.check_split(known, self.split)
-        entries = run_search.ordered(filter(self.filter.passes, known), self.sort, self.split)
+        entries = run_search.ordered(run_search.matching(known, self.filter, self.split), self.sort, self.split)
         rows = [{name: _cell(entry, name, self.split) for name in self.columns} for entry in entries]
         if self.json:
             print_json(rows)
@@ -125,7 +125,7 @@ class Best:
         from dextron_bench.methods.registry import CEILINGS
 
         entrants = [entry for entry in run_catalogue.entries(self.runs) if entry.label not in CEILINGS]
-        entries = run_search.ordered(filter(self.filter.passes, entrants), "return", self.split)
+        entries = run_search.ordered(run_search.matching(entrants, self.filter, self.split), "return", self.split)
         if not entries or entries[0].score(self.split) != entries[0].score(self.split):
             raise run_search.BadSearch(f"none of the {len(entries)} runs has a score on {self.split!r}")
         best = entries[0]
