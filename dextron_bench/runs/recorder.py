@@ -126,7 +126,7 @@ def _end_with_parent() -> None:
 
 
 def _write(*job: Any) -> str:
-    return recording_files.write(*_SOURCE, *job)
+    return recording_files.write(_SOURCE[0], *job)
 
 
 def _processors() -> int:
