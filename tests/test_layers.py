@@ -45,7 +45,7 @@ SDKS = {  # Packages of others that one place alone imports.
     "minari": "dextron_bench/evaluation/minari_export.py",
     "av": "dextron_bench/recording/film.py",
     "tensorboard": "dextron_bench/tracking/to_tensorboard.py",
-    "trackio": "dextron_bench/tracking/to_trackio.py",
+    "trackio": "dextron_bench/tracking/to_wandb.py",
     "wandb": "dextron_bench/tracking/to_wandb.py",
     "tyro": "dextron_bench/cli/",
     "rich": "dextron_bench/cli/",

@@ -86,7 +86,7 @@ LEARNERS = {  # By label: the flags of the method.
     "rlil-0.3": "rlil --dur 0.3",
 }
 TENTH = {f"{method}-tenth": f"{method} --preset tenth" for method in ("rlpd", "dagger")}  # By label: their flags.
-SHOWN = {  # By label: the flags of the learners with recordings that ship, besides SOR and SIM.
+SHOWN = {  # By label: the flags of the learners whose episodes may become recordings that ship, besides SOR.
     **{label: LEARNERS[label] for label in ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")},
     **TENTH,
     "stopping": "stopping",
@@ -107,8 +107,8 @@ def _success(reaches: str, rows: int, epochs: int, labels: tuple[str, ...]) -> S
     return Step(f"success-{reaches}", (data, train), (f"{DATA}/splits-{reaches}.parquet", *policies), copies=copies)
 
 
-def _show(method: str, reaches: str = "synthetic") -> str:
-    return f"eval --method {method} --reaches {reaches} --seed 0 --split test --runs {{runs}}/show"
+def _show(method: str) -> str:
+    return f"eval --method {method} --reaches synthetic --seed 0 --split test --runs {{runs}}/show"
 
 
 STEPS: tuple[Step, ...] = (
@@ -144,8 +144,7 @@ STEPS: tuple[Step, ...] = (
         (
             "run --method exp --split test --runs {runs}/show",
             *map(_show, (*SHOWN.values(), "sor")),
-            _show("sim", "minjerk"),
-            "recordings choose --runs {runs}/show --into recordings",
+            "recordings choose --runs {runs}/show --method exp rlil-0.1 sor stopping --into recordings",
         ),
         needs=(
             *(SPLITS, f"{DATA}/success-synthetic.safetensors", SIM),

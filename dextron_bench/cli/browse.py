@@ -53,7 +53,7 @@ class Browse:
     """Print the matching episodes as JSON and serve nothing."""
 
     def __call__(self) -> int:
-        from dextron_bench.catalogue import episode_catalogue
+        from dextron_bench.catalogue import episodes as catalogue
         from dextron_bench.catalogue.browse.search import Search
 
         if not self.json and not self.web:
@@ -61,10 +61,10 @@ class Browse:
 
             require_screen()
         search = Search(self.where, self.order)
-        episodes = episode_catalogue.read(self.place)
+        episodes = catalogue.read(self.place)
         matching = search.matching(episodes)  # Raises BadExpression before anything is served.
         if self.json:
-            rows = matching[list(episode_catalogue.COLUMNS)].to_dict("records")
+            rows = matching[list(catalogue.COLUMNS)].to_dict("records")
             print_json(rows)
         else:
             self._serve(episodes, search)

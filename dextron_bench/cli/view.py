@@ -163,9 +163,9 @@ class View(EpisodeFlags):
 
     def _select(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
         """The recordings of selected episodes; prints a table of them unless --print is set."""
-        from dextron_bench.catalogue import rerecording, selection
+        from dextron_bench.catalogue import episodes, rerecording, selection
 
-        table, matching = selection.select(selection.episodes(places), episode_filter)
+        table, matching = selection.select(episodes.read(places), episode_filter)
         with progress_bar("recordings", self.quiet) as progress:
             files = rerecording.rerecord(table, progress)
         if not self.print:
@@ -180,18 +180,17 @@ class View(EpisodeFlags):
 def _undamaged(files: Sequence[Path]) -> list[Path]:
     """The undamaged recordings; prints a line on stderr for each damaged one. Raises NoEpisodes if all are damaged."""
     from dextron_bench import recording
-    from dextron_bench.catalogue import selection
+    from dextron_bench.catalogue import episodes, selection
 
     summaries = list(recording.summarise(files, whole=True, hashes=selection.hashes(files)))
     damaged = [f"{summary.file}: {summary.damage}" for summary in summaries if summary.damage]
     if len(damaged) == len(summaries):
-        raise selection.NoEpisodes("; ".join(damaged))
+        raise episodes.NoEpisodes("; ".join(damaged))
     for fault in damaged:
         print_warning(fault)
     return [summary.file for summary in summaries if not summary.damage]
 
 
 def _print_episodes(table: pd.DataFrame) -> None:
-    columns = ["method", "reaches", "seed", "split", "row", "score", "length", "cause"]
-    titles = [{"score": "return", "length": "steps"}.get(column, column) for column in columns]
-    print_table("episodes", titles, table[columns].itertuples(index=False))
+    columns = ["method", "reaches", "seed", "split", "row", "return", "steps", "cause"]
+    print_table("episodes", columns, table[columns].itertuples(index=False))

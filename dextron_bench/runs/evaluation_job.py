@@ -151,7 +151,7 @@ class EvaluationJob:
             for row, episode in self.play(split, rows):
                 played[row] = episode_table.row(split, row, episode)
                 if row < self.record and len(episode.actions):
-                    about = recording_files.properties(split, row, self.about)
+                    about = recording_files.properties(split, row, self.about, played[row]["cause"])
                     recorder.write(self.folder.recording(split.name, row), split.case(row), episode, about)
                 report(len(played), len(rows))
             recordings = recorder.hashes()

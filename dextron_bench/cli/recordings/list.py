@@ -61,19 +61,20 @@ class List(EpisodeFlags):
         return DIFFERS if damaged else DONE
 
     def _selected(self, undamaged: list[Summary]) -> list[Summary]:
-        from dextron_bench.catalogue import recorded_episodes
-        from dextron_bench.catalogue.selection import EpisodeFilter
+        from dextron_bench.catalogue import episodes, selection
 
-        episode_filter = self.episode_filter()
-        return undamaged if episode_filter == EpisodeFilter() else recorded_episodes.select(undamaged, episode_filter)
+        if (episode_filter := self.episode_filter()) == selection.EpisodeFilter():
+            return undamaged
+        table = selection.matching(episodes.of_recordings(undamaged), episode_filter)
+        return [undamaged[place] for place in selection.best_and_worst(table, episode_filter).index]
 
 
 def _row(summary: Summary) -> dict[str, Any]:
-    from dextron_bench.catalogue import recorded_episodes
+    from dextron_bench.catalogue import episodes
 
     row: dict[str, Any] = {"file": str(summary.file)}
     row |= {title: summary.properties.get(name) for name, title in COLUMNS.items()}
     is_pair = "pair" in summary.properties
     row["outcome"] = "a pair" if is_pair else row["outcome"]
-    row["cause"] = None if is_pair or summary.damage else recorded_episodes.cause(summary)
+    row["cause"] = None if is_pair or summary.damage else episodes.cause(summary)
     return row | {"kB": round(summary.size / 1000), "damage": summary.damage}

@@ -34,7 +34,7 @@ class Best:
         from dextron_bench.methods.registry import CEILINGS
 
         entrants = [entry for entry in run_catalogue.entries(self.runs) if entry.label not in CEILINGS]
-        entries = run_search.ordered(filter(self.filter.passes, entrants), "return", self.split)
+        entries = run_search.ordered(run_search.matching(entrants, self.filter, self.split), "return", self.split)
         if not entries or entries[0].score(self.split) != entries[0].score(self.split):
             raise run_search.BadSearch(f"none of the {len(entries)} runs has a score on {self.split!r}")
         best = entries[0]

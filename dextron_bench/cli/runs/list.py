@@ -48,7 +48,7 @@ class List:
         known = run_catalogue.entries(self.runs)
         if self.split != SPLIT:
             run_search.check_split(known, self.split)
-        entries = run_search.ordered(filter(self.filter.passes, known), self.sort, self.split)
+        entries = run_search.ordered(run_search.matching(known, self.filter, self.split), self.sort, self.split)
         rows = [{name: cell(entry, name, self.split) for name in self.columns} for entry in entries]
         if self.json:
             print_json(rows)
