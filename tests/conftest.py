@@ -93,6 +93,22 @@ def small_release(tmp_path: Path) -> SmallRelease:
 
 
 @pytest.fixture
+def rates(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Grows by the learning rate of each step of an optimiser Adam that is made from now on."""
+    import torch
+
+    used: list[float] = []
+
+    class Watched(torch.optim.Adam):
+        def step(self, *arguments: Any) -> Any:
+            used.append(self.param_groups[0]["lr"])
+            return super().step(*arguments)
+
+    monkeypatch.setattr(torch.optim, "Adam", Watched)
+    return used
+
+
+@pytest.fixture
 def complaint(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
     """The one line on stderr of a command that ends with code 2 and no result."""
 
