@@ -1,4 +1,4 @@
-"""The help of tables of commands: all of them under headings, or those of a group. Tyro writes a command's own help."""
+"""The help of all commands, under headings, and of the commands of a group. Tyro writes a command's own help."""
 
 from __future__ import annotations
 

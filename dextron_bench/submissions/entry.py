@@ -21,7 +21,7 @@ class BadSubmission(ValueError):
 
 
 def whole_settings(spec: str, settings: dict[str, Any], reaches: str) -> dict[str, Any]:
-    """An agent's settings; those of an installed method with its defaults for the source of reaches.
+    """An agent's settings; an installed method also has its defaults for the source of reaches.
 
     Raises BadSettings.
     """

@@ -108,11 +108,11 @@ def test_flags_of_a_method_are_in_the_help(here: Path, capsys: pytest.CaptureFix
     ("words", "expected"),
     [
         (["--nosuch", "1"], "unknown flag --nosuch"),
-        (["--rate", "x"], "Error parsing --rate: could not convert string to float: 'x'; see `dextron-bench run --h"),
+        (["--rate", "x"], "--rate: 'x' is not a number; see `dextron-bench run --h"),
         (["--rate", "-1"], "--rate is -1; a learning rate is positive"),
         (
             ["--preset", "no"],
-            "invalid choice 'no' for argument '--preset'. Expected one of ('paper', 'quick', 'smoke')",
+            "--preset: 'no' is not one of paper, quick, smoke; see",
         ),
         (["--split", "tset"], "no split 'tset' of 'synthetic' reaches"),
         (["--breaks", "1"], "epoch 1 of method 'toy-0.1' raised ZeroDivisionError: toys break"),

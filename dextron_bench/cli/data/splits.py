@@ -1,4 +1,4 @@
-"""`dextron-bench data splits`: lists the splits, and builds those of a source of reaches."""
+"""`dextron-bench data splits`: lists the splits, or builds the splits of a source of reaches."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class NeedsSplits(FileNotFoundError):
 
 @dataclass(frozen=True)
 class Splits:
-    """List the splits that ship; with --into, build those of a source from its expert database instead.
+    """List the splits that ship; with --into, build the splits of a source from its expert database.
 
     Every row that is built has its difficulty.
     With --bottles, build the rows of the tracks with other bottles, from the splits that are in the folder.

@@ -58,7 +58,17 @@ class List:
         else:
             cells = [[_shown(row[name], name) for name in self.columns] for row in rows]
             print_table(f"runs in {self.runs}, scores on {self.split}", self.columns, cells)
+            self._print_trainings()
         return DONE
+
+    def _print_trainings(self) -> None:
+        """Prints what is left of trainings, of failed runs too, if some are not over."""
+        from dextron_bench.training import jobs
+
+        left = jobs.unfinished(self.runs)
+        trainings = [(one.label, one.reaches, " ".join(map(str, one.seeds)), one.left) for one in left]
+        if trainings:
+            print_table(f"trainings in {self.runs}", ["method", "reaches", "seeds", "left"], trainings)
 
 
 def _shown(value: Any, name: str) -> str:

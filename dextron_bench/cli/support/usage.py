@@ -76,13 +76,13 @@ def _refusal(command: type, given: Sequence[tuple[Option, list[str]]]) -> str:
     hints = typing.get_type_hints(command, include_extras=True)
     parts = (_part(field, hints[field.name]) for field in dataclasses.fields(command))
     for part in filter(None, parts):
-        own = {field.name: field for field in dataclasses.fields(part)}
+        fields = {field.name: field for field in dataclasses.fields(part)}
         try:
             part(
                 **{
                     option.field.name: _converted(_bare(option.hint), values or [str(option.field.default is not True)])
                     for option, values in given
-                    if own.get(option.field.name) is option.field
+                    if fields.get(option.field.name) is option.field
                 }
             )
         except ValueError as error:
