@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from dextron_bench.cli.leaderboard.show import print_rows
-from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support import pieces
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.output import progress_bar
+from dextron_bench.cli.support.pieces import Pieces
 from dextron_bench.reaches.sources import RankedSource
 from dextron_bench.submissions.declaration import Declaration
 
@@ -58,15 +59,10 @@ class Submit:
     """Folder of all runs."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard; the printed table has its methods too. Without it: the published leaderboard."""
-    cluster: clusters.Flag = ""
-    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
     depend on it."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
+    pieces: Annotated[Pieces, tyro.conf.arg(name="")] = field(default_factory=Pieces)
     quiet: bool = False
     """Show no progress."""
     settings: str = "{}"
@@ -82,14 +78,13 @@ class Submit:
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
-        clusters.check(self.cluster, self.share, self.merge)
-        share = shares.parse(self.share, self.merge)
-        if share is not None or self.merge:
+        share = self.pieces.parsed()
+        if share is not None or self.pieces.merge:
             jobs = playing.prepare_all(entry, self.runs, self.record, limits, self.threads)
             if share is not None:
-                return shares.play_jobs(jobs, share, self.runs, self.quiet)
-            shares.check_jobs(jobs)
-        if self.cluster:
+                return pieces.play_jobs(jobs, share, self.runs, self.quiet)
+            pieces.check_jobs(jobs)
+        if self.pieces.cluster:
             self._play_on_cluster(entry, limits)
         with progress_bar(entry.name, self.quiet) as progress:
             folder = playing.play_entry(entry, self.runs, self.record, limits, self.threads, progress)
@@ -107,7 +102,7 @@ class Submit:
         from dextron_bench.cluster import submissions
 
         with (
-            clusters.connected(self.cluster, self.runs, self.threads) as cluster,
+            pieces.connected(self.pieces.cluster, self.runs, self.threads) as cluster,
             progress_bar(f"{entry.name}, pieces", self.quiet) as progress,
         ):
             submissions.play(cluster, entry, self.runs, self.record, limits, progress)

@@ -36,7 +36,7 @@ def with_method_settings(arguments: Sequence[str], command: Any) -> Any:
     from dextron_bench.methods import registry
     from dextron_bench.methods.settings import settings_class
 
-    flags = {field.name for field in dataclasses.fields(command)} - {FIELD}
+    flags = set(_flags(command)) - {FIELD}
     method = settings_class(registry.find_method(spec), taken=flags)
     if method is None:
         return command
@@ -63,6 +63,16 @@ def as_bad_settings(arguments: Sequence[str]) -> Iterator[None]:
 def settings_dict(settings: Any) -> dict[str, Any]:
     """The settings in a command's field, by name."""
     return {} if settings is None else {f.name: getattr(settings, f.name) for f in dataclasses.fields(settings)}
+
+
+def _flags(command: Any) -> Iterator[str]:
+    """Names of the flags of a command; a field whose default is made by a dataclass is a group of flags."""
+    for field in dataclasses.fields(command):
+        group = field.default_factory
+        if dataclasses.is_dataclass(group):
+            yield from _flags(group)
+        else:
+            yield field.name
 
 
 def _method_spec(arguments: Sequence[str]) -> str | None:
