@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.support import flags, shares
+from dextron_bench.cli.support import flags, pieces
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import progress_bar
@@ -38,10 +38,7 @@ class Eval:
     """How many episodes of each split to record, from the first."""
     runs: flags.Runs = flags.RUNS
     threads: flags.Threads = 0
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
+    pieces: Annotated[pieces.Shares, tyro.conf.arg(name="")] = field(default_factory=pieces.Shares)
     quiet: flags.Quiet = False
     json: bool = False
     """Print the rows as JSON."""
@@ -50,12 +47,12 @@ class Eval:
     def __call__(self) -> int:
         from dextron_bench.runs import execution, result_files
 
-        share, runs, folder = shares.parse(self.share, self.merge), self._runs(), self.runs / "eval"
-        if share is not None or self.merge:
+        share, runs, folder = self.pieces.parsed(), self._runs(), self.runs / "eval"
+        if share is not None or self.pieces.merge:
             jobs = [execution.prepare(run, folder, self.threads) for run in runs]
             if share is not None:
-                return shares.play_jobs(jobs, share, folder, self.quiet)
-            shares.check_jobs(jobs)
+                return pieces.play_jobs(jobs, share, folder, self.quiet)
+            pieces.check_jobs(jobs)
         results = []
         for run in runs:
             with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from dextron_bench.cli.support import clusters, flags, shares
+from dextron_bench.cli.support import flags, pieces
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import print_json, print_table, print_warning, progress_bar
@@ -19,6 +19,7 @@ TrackerName = Literal["rerun", "tensorboard", "trackio", "wandb"]
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
     from dextron_bench.runs.evaluation_job import EvaluationJob
+    from dextron_bench.storage.shares import Share
 
 
 @dataclass(frozen=True)
@@ -48,16 +49,11 @@ class Run:
     live: bool = False
     """Show the training in Rerun's viewer while it runs."""
     runs: flags.Runs = flags.RUNS
-    cluster: clusters.Flag = ""
-    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
     depend on it."""
     device: flags.Device = "cpu"
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
+    pieces: Annotated[pieces.Pieces, tyro.conf.arg(name="")] = field(default_factory=pieces.Pieces)
     dry_run: bool = False
     """Only print what is left to do and an estimate of the time."""
     quiet: flags.Quiet = False
@@ -70,15 +66,14 @@ class Run:
             from dextron_bench.tracking import packages
 
             packages.require(self.tracker)
-        clusters.check(self.cluster, self.share, self.merge)
-        share, groups = shares.parse(self.share, self.merge), self._groups()
+        share, groups = self.pieces.parsed(), self._groups()
         if self.dry_run:
             return self._estimate(groups)
         if share is not None:
             return self._play(share, groups)
-        if self.merge:
-            shares.check_jobs(self._jobs(groups))
-        if self.cluster:
+        if self.pieces.merge:
+            pieces.check_jobs(self._jobs(groups))
+        if self.pieces.cluster:
             self._play_on_cluster(groups)
         return self._execute(groups)
 
@@ -87,15 +82,15 @@ class Run:
 
         return [execution.prepare(run, self.runs, self.threads) for group in groups for run in group]
 
-    def _play(self, share: shares.Share, groups: list[list[plans.Run]]) -> int:
+    def _play(self, share: Share, groups: list[list[plans.Run]]) -> int:
         """Plays the pieces of a share."""
-        return shares.play_jobs(self._jobs(groups), share, self.runs, self.quiet)
+        return pieces.play_jobs(self._jobs(groups), share, self.runs, self.quiet)
 
     def _play_on_cluster(self, groups: list[list[plans.Run]]) -> None:
         """Trains and plays on a cluster what the folder of runs lacks."""
         from dextron_bench.cluster import evaluations, trainings
 
-        with clusters.connected(self.cluster, self.runs, self.threads) as cluster:
+        with pieces.connected(self.pieces.cluster, self.runs, self.threads) as cluster:
             with progress_bar("epochs", self.quiet) as progress:
                 trainings.train(cluster, groups, self.runs, self.device, progress)
             with progress_bar("pieces", self.quiet) as progress:

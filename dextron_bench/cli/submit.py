@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.support import clusters, flags, shares
+from dextron_bench.cli.support import flags, pieces
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import changed_settings
 from dextron_bench.cli.support.output import progress_bar
@@ -57,15 +57,10 @@ class Submit:
     runs: flags.Runs = flags.RUNS
     board: Path = Path("leaderboard")
     """Folder of the leaderboard; the printed table has its methods too. Without it: the published leaderboard."""
-    cluster: clusters.Flag = ""
-    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
     depend on it."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
+    pieces: Annotated[pieces.Pieces, tyro.conf.arg(name="")] = field(default_factory=pieces.Pieces)
     quiet: flags.Quiet = False
     method_settings: tyro.conf.Suppress[Any] = None
 
@@ -79,14 +74,13 @@ class Submit:
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
-        clusters.check(self.cluster, self.share, self.merge)
-        share = shares.parse(self.share, self.merge)
-        if share is not None or self.merge:
+        share = self.pieces.parsed()
+        if share is not None or self.pieces.merge:
             jobs = playing.prepare_all(entry, self.runs, self.record, limits, self.threads)
             if share is not None:
-                return shares.play_jobs(jobs, share, self.runs, self.quiet)
-            shares.check_jobs(jobs)
-        if self.cluster:
+                return pieces.play_jobs(jobs, share, self.runs, self.quiet)
+            pieces.check_jobs(jobs)
+        if self.pieces.cluster:
             self._play_on_cluster(entry, limits)
         with progress_bar(entry.name, self.quiet) as progress:
             folder = playing.play_entry(entry, self.runs, self.record, limits, self.threads, progress)
@@ -104,7 +98,7 @@ class Submit:
         from dextron_bench.cluster import submissions
 
         with (
-            clusters.connected(self.cluster, self.runs, self.threads) as cluster,
+            pieces.connected(self.pieces.cluster, self.runs, self.threads) as cluster,
             progress_bar(f"{entry.name}, pieces", self.quiet) as progress,
         ):
             submissions.play(cluster, entry, self.runs, self.record, limits, progress)

@@ -51,10 +51,13 @@ def all_shipped(reaches: str) -> list[Path]:
     return sorted(file for folder in folders for file in visible(folder, f"*/{reaches}/seed*.safetensors"))
 
 
-def metadata(file: Path) -> dict[str, Any]:
-    """The training that made a file's weights, and the SHA-256 of the file; raises BadTensors, OSError."""
+def metadata(file: Path, sha256: str = "") -> dict[str, Any]:
+    """The training that made a file's weights, and the SHA-256 of the file, which is computed if it is not given.
+
+    Raises BadTensors, OSError.
+    """
     header = tensors.read_about(file)
-    return {**{name: header[name] for name in METADATA if name in header}, "sha256": hashing.sha256(file)}
+    return {**{name: header[name] for name in METADATA if name in header}, "sha256": sha256 or hashing.sha256(file)}
 
 
 def seed_of(file: Path) -> int:

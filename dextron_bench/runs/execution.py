@@ -15,7 +15,7 @@ from dextron_bench.runs import playing, result_files, run_files
 from dextron_bench.runs.evaluation_job import EvaluationJob, Played
 from dextron_bench.runs.plans import Run, no_weights
 from dextron_bench.splits.loading import Split, load_split
-from dextron_bench.storage import folder_config, hashing, provenance
+from dextron_bench.storage import folder_config, provenance
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.training import loop
 
@@ -49,25 +49,23 @@ def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progre
     `report` receives the episodes of each split. Raises FolderMismatch, DamagedFile, UnknownSplit, MissingData,
     AgentError, MissingWeights, and the errors of `shares.Work.read`.
     """
-    training = run.training_job(runs)
-    if training:  # Splits or data that are missing end the command before the training.
+    training, splits = run.training_job(runs), _splits(run)  # What is missing ends the command before the training.
+    if training:
         sources.open_source(run.source)
-        for name in run.splits:
-            load_split(run.source, name)
         train([run], runs, threads)
-    job = prepare(run, runs, threads)
+    job = prepare(run, runs, threads, splits)
     with playing.shown(job.folder, report) as report_and_show:
         table = job.table(report_and_show)
     result_files.write_result(job.folder, table, job.facts, training.seconds(run.seed) if training else None)
     return job.folder.path
 
 
-def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
-    """The evaluation of a run whose training is done; writes the config of its folder.
+def prepare(run: Run, runs: Path, threads: int = 0, splits: Sequence[Split] = ()) -> EvaluationJob:
+    """The evaluation of a run whose training is done, on its splits if they are loaded; writes its folder's config.
 
     Raises NotTrained, FolderMismatch, DamagedFile, UnknownSplit, MissingData, AgentError, MissingWeights.
     """
-    splits = [load_split(run.source, name) for name in run.splits]
+    splits = splits or _splits(run)
     source, folder = sources.open_source(run.source), run.folder(runs)
     file = weights_file(run, runs)
     if file and not file.exists():
@@ -77,13 +75,14 @@ def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
         )
     player = agent(run, file)  # If this raises, there is no folder yet.
     folder_config.write_or_check(folder.path, run.config(), registry.defaults_of(run.method))
-    copy = run_files.copy_weights(file, folder) if file else None
+    sha256 = run_files.copy_weights(file, folder) if file else None
+    copy = folder.weights if file else None
 
     def play(split: Split, rows: range) -> Played:
         for place, episode in rollout(agent(run, copy), source, split.rows(rows), threads=threads):
             yield rows.start + place, episode
 
-    facts = run.about | _training_facts(run, copy)
+    facts = run.about | (_training_facts(run, folder.weights, sha256) if sha256 else {})
     facts |= {"privileged": "each setting's expert"} if isinstance(player, Privileged) else {}
     return EvaluationJob(
         folder,
@@ -93,7 +92,7 @@ def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
         run.plan.record,
         run.about,
         facts,
-        run.config() | {"weights": hashing.sha256(copy) if copy else None},
+        run.config() | {"weights": sha256},
         provenance.code_hash(*registry.package_files(type(run.method))),
         getattr(player, "rows_are_independent", False) is True,
         threads=threads,
@@ -119,11 +118,14 @@ def weights_file(run: Run, runs: Path) -> Path | None:
     return run.plan.weights
 
 
-def _training_facts(run: Run, file: Path | None) -> dict[str, Any]:
+def _splits(run: Run) -> list[Split]:
+    """The splits that a run plays; raises UnknownSplit, MissingData."""
+    return [load_split(run.source, name) for name in run.splits]
+
+
+def _training_facts(run: Run, file: Path, sha256: str) -> dict[str, Any]:
     """What a result says of the training: the facts in the file of weights, and the number of demonstrations."""
-    if file is None:
-        return {}
-    facts = weights.metadata(file)
+    facts = weights.metadata(file, sha256)
     if run.learner is None or run.plan.weights:
         return {"training": facts}
     count = getattr(run.learner, "demonstrations", lambda episodes: None)

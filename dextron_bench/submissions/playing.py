@@ -47,29 +47,32 @@ def prepare_all(entry: Entry, runs: Path, record: int, limits: Limits, threads: 
     """
     bundle.check({"format": bundle.FORMAT, **entry.manifest(), "files": {}}, "bundle", entry.folder(runs))
     bundle.check_agent(entry.files())
-    source = sources.open_source(entry.reaches)
-    return [
-        _prepare(entry, source, RunFolder.of_seed(entry.folder(runs), seed), record, limits, threads)
-        for seed in entry.seeds
-    ]
-
-
-def _prepare(
-    entry: Entry, source: Source, folder: RunFolder, record: int, limits: Limits, threads: int
-) -> EvaluationJob:
-    """The evaluation of one seed."""
+    source, config = sources.open_source(entry.reaches), _config(entry)
     splits = [load_split(entry.reaches, name) for name in ranking_splits(entry.reaches)]
-    config = _config(entry, folder.seed)
-    folder_config.write_or_check(folder.path, config)
-    about = {"method": entry.name, "reaches": entry.reaches, "seed": folder.seed}
 
-    def play(split: Split, rows: range) -> Played:
-        return play_shuffled(entry.launch, source, split, folder.seed, limits, threads)
+    def prepare(seed: int) -> EvaluationJob:
+        folder = RunFolder.of_seed(entry.folder(runs), seed)
+        folder_config.write_or_check(folder.path, config | {"seed": seed})
+        about = {"method": entry.name, "reaches": entry.reaches, "seed": seed}
 
-    code = provenance.code_hash()
-    return EvaluationJob(
-        folder, source, splits, play, record, about, about, config, code, one_platform=True, threads=threads
-    )
+        def play(split: Split, rows: range) -> Played:
+            return play_shuffled(entry.launch, source, split, seed, limits, threads)
+
+        return EvaluationJob(
+            folder,
+            source,
+            splits,
+            play,
+            record,
+            about,
+            about,
+            config | {"seed": seed},
+            provenance.code_hash(),
+            one_platform=True,
+            threads=threads,
+        )
+
+    return [prepare(seed) for seed in entry.seeds]
 
 
 def play_shuffled(
@@ -93,10 +96,10 @@ def write_bundle(entry: Entry, folder: Path, file: Path) -> dict[str, Any]:
     return bundle.pack(folder, entry.manifest(), entry.files(), file)
 
 
-def _config(entry: Entry, seed: int) -> dict[str, Any]:
-    """What the run of a seed depends on."""
+def _config(entry: Entry) -> dict[str, Any]:
+    """What the run of a seed depends on, besides the seed."""
     manifest = entry.manifest()
     hashes = {name: hashing.sha256(file) for name, file in entry.files().items()}
     return {name: manifest[name] for name in ("agent", "reaches", "physics")} | {
-        "method": entry.name, "seed": seed, "files": hashes
+        "method": entry.name, "files": hashes
     }  # fmt: skip

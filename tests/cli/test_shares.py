@@ -206,6 +206,19 @@ def test_a_share_and_a_merge_at_once_are_refused(here: Path, complaint: Callable
     assert "give one of both" in complaint(*RUN, "--share", "0/2", "--merge")
 
 
+def test_a_setting_of_a_method_cannot_hide_a_flag_of_the_group(here: Path, complaint: Callable[..., str]):
+    text = constant_agent(here, "0.1").replace(":Constant", ":Mine")
+    (here / "constant.py").write_text(
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\nclass Mine:\n    merge: int = 1\n    name = 'mine'\n"
+        "    def agent(self, seed): return self\n"
+    )
+    for command in ("run", "eval"):
+        assert f"has a setting 'merge', but {command!r} already has a flag of this name" in complaint(
+            command, "--method", text
+        )
+
+
 def test_a_share_trains_nothing(here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]):
     tiny_training.install(tiny_training.write(here / "data"), monkeypatch.setattr)
     words = ("run", "--method", TOY, "--preset", "smoke", "--quiet", "--record", "0", "--split", "test")

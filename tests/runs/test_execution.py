@@ -19,7 +19,7 @@ from dextron_bench.reaches.setting import from_frame
 from dextron_bench.runs import execution, result_files
 from dextron_bench.runs.plans import Plan, resolve
 from dextron_bench.splits.loading import load_split
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, hashing
 from tests.helpers import tiny_benchmark, tiny_training
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 from tests.helpers.tiny_runs import execute, forbidden
@@ -150,6 +150,17 @@ def test_a_run_creates_its_method_once(
     monkeypatch.setattr(registry, "create", lambda *args: created.append(args[0]) or create(*args))
     execution.execute(resolve(Plan(spec, "synthetic", ("test",), settings=settings)), tmp_path / "runs", threads=1)
     assert created == [spec]
+
+
+def test_weights_are_hashed_and_splits_are_loaded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    plan = Plan("tests.helpers.toy_learner:Toy", "synthetic", ("test",), settings={"preset": "quick"})
+    hashed, sha256, loaded, load = [], hashing.sha256, [], execution.load_split
+    monkeypatch.setattr(hashing, "sha256", lambda file: hashed.append(Path(file).name) or sha256(file))
+    monkeypatch.setattr(execution, "load_split", lambda *names: loaded.append(names[1]) or load(*names))
+    execution.execute(resolve(plan), tmp_path / "runs", threads=1)
+    assert hashed.count("weights.safetensors") == 1
+    assert loaded.count("test") == 1
 
 
 def test_a_run_constructs_its_method_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

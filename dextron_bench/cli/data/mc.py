@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.support import clusters, flags, shares
+from dextron_bench.cli.support import flags, pieces
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
 
@@ -30,12 +30,7 @@ class MonteCarlo:
     """Search until this many rows have the full return of 20."""
     seed: int = 0
     """Seed of all draws."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
-    cluster: clusters.Flag = ""
-    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
+    pieces: Annotated[pieces.Pieces, tyro.conf.arg(name="")] = field(default_factory=pieces.Pieces)
     threads: int = 0
     """Threads of the simulation; 0 means one per processor. On a cluster: of a piece, and 0 means one."""
     extend: bool = False
@@ -51,8 +46,7 @@ class MonteCarlo:
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.world.engine import Engine
 
-        share = shares.parse(self.share, self.merge)
-        clusters.check(self.cluster, self.share, self.merge)
+        share = self.pieces.parsed()
         search = montecarlo.Search(self.reaches, self.seed)
         folder = self.runs / "mc" / self.reaches / f"seed{self.seed}"
         source = open_source(self.reaches)
@@ -64,10 +58,10 @@ class MonteCarlo:
         if share is not None:
             with progress_bar(f"blocks of share {share}", self.quiet) as progress:
                 count = montecarlo.run_share(source, search, folder, self.rows, engine, share, progress)
-            return shares.print_done(share, f"{count} blocks", folder)
-        if self.merge:
+            return pieces.print_done(share, f"{count} blocks", folder)
+        if self.pieces.merge:
             montecarlo.check_complete(search, folder, self.rows)
-        if self.cluster:
+        if self.pieces.cluster:
             self._play_on_cluster(search, folder)
         with progress_bar("rows of return 20", self.quiet) as progress:
             draws = montecarlo.run(source, search, folder, self.rows, engine, progress)
@@ -79,7 +73,7 @@ class MonteCarlo:
         from dextron_bench.cluster import searches
 
         with (
-            clusters.connected(self.cluster, self.runs, self.threads) as cluster,
+            pieces.connected(self.pieces.cluster, self.runs, self.threads) as cluster,
             progress_bar("rows of return 20", self.quiet) as progress,
         ):
             searches.play_blocks(cluster, search, folder, self.runs, self.rows, progress)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support import pieces as piece_flags
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import progress_bar
 from dextron_bench.leaderboard import build, finding_pieces
@@ -13,6 +13,7 @@ from dextron_bench.leaderboard.baseline_check import Finding
 from dextron_bench.leaderboard.finding_pieces import FindingPieces
 from dextron_bench.leaderboard.verify_board import Row
 from dextron_bench.storage.printable import printable_line
+from dextron_bench.storage.shares import Share, check_complete
 
 if TYPE_CHECKING:
     from dextron_bench.cli.support.verification_flags import BoardFlags
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 SHOWN = 5  # How many problems of a row are printed.
 
 
-def verify_share(flags: BoardFlags, share: shares.Share) -> int:
+def verify_share(flags: BoardFlags, share: Share) -> int:
     """Verifies the rows of a share and stores what it finds; returns the exit code."""
     pieces, rows = _pieces(flags), board.rows(flags.board, flags.method, flags.reaches)
     mine = [row for place, row in enumerate(rows) if share.has(place)]
@@ -28,18 +29,18 @@ def verify_share(flags: BoardFlags, share: shares.Share) -> int:
     for row in mine:
         if row.run.identity not in stored:
             pieces.write(row, _check(flags, row))
-    return shares.print_done(share, f"{len(mine)} of {len(rows)} rows", pieces.folder)
+    return piece_flags.print_done(share, f"{len(mine)} of {len(rows)} rows", pieces.folder)
 
 
 def verify_board(flags: BoardFlags) -> int:
     """Verifies every row, or with --merge takes the findings of shares, and prints them; returns the exit code."""
     sound, pieces = True, _pieces(flags)
     rows = board.rows(flags.board, flags.method, flags.reaches)
-    if flags.cluster:
+    if flags.pieces.cluster:
         _check_on_cluster(flags, pieces, rows)
     stored = pieces.read(rows)
-    if flags.merge:
-        shares.check_complete("the merge", [row.run.identity for row in rows], stored)
+    if flags.pieces.merge:
+        check_complete("the merge", [row.run.identity for row in rows], stored)
     findings = {name: finding_pieces.finding_of(piece) for name, piece in stored.items()}
     for row in rows:
         finding = findings.get(row.run.identity) or _check(flags, row)
@@ -64,7 +65,7 @@ def _check_on_cluster(flags: BoardFlags, pieces: FindingPieces, rows: list[Row])
     from dextron_bench.cluster import verifications
 
     with (
-        clusters.connected(flags.cluster, flags.runs, flags.threads) as cluster,
+        piece_flags.connected(flags.pieces.cluster, flags.runs, flags.threads) as cluster,
         progress_bar("rows", flags.quiet) as progress,
     ):
         verifications.check(cluster, pieces, rows, flags.runs, progress)

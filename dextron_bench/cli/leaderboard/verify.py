@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 
-from dextron_bench.cli.support import clusters, shares, verdicts
+from dextron_bench.cli.support import verdicts
 from dextron_bench.cli.support.verification_flags import BoardFlags
-
-if TYPE_CHECKING:
-    pass
+from dextron_bench.storage.shares import BadShare
 
 
 @dataclass(frozen=True)
@@ -20,6 +18,7 @@ class Verify(BoardFlags):
     """Verify a submission: replay its actions and compare all its claims with the replayed episodes.
 
     With --all, verify every row of a leaderboard: replay the actions of submissions, and run the baselines again.
+    Only with --all, the work has pieces, one for each row, for --share, --merge and --cluster.
 
     Example: dextron-bench leaderboard verify my-agent-synthetic.zip
     """
@@ -33,18 +32,15 @@ class Verify(BoardFlags):
         from dextron_bench.cli.leaderboard import board_verification
         from dextron_bench.leaderboard import verify_board
 
-        clusters.check(self.cluster, self.share, self.merge)
-        share = shares.parse(self.share, self.merge)
+        share = self.pieces.parsed()
         if self.all and self.bundle is not None:
             raise verify_board.NothingToVerify(
                 f"--all verifies the leaderboard's own rows: leave out {self.bundle}, or leave out --all"
             )
         if not self.all and self.bundle is None:
             raise verify_board.NothingToVerify("give a submission, or --all for the leaderboard's own rows")
-        if self.bundle is not None and (share is not None or self.merge or self.cluster):
-            raise shares.BadShare(
-                "--share, --merge and --cluster need --all: the verification of a submission is one piece"
-            )
+        if self.bundle is not None and (share is not None or self.pieces.merge or self.pieces.cluster):
+            raise BadShare("--share, --merge and --cluster need --all: the verification of a submission is one piece")
         if share is not None:
             return board_verification.verify_share(self, share)
         if self.bundle is None:

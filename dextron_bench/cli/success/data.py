@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli.support import clusters, flags, shares
+from dextron_bench.cli.support import flags, pieces
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
 from dextron_bench.cli.support.success_models import folder_of
@@ -33,16 +33,11 @@ class Data:
     """Weights of the policies that play half of the episodes, in turn; by default experts play all episodes."""
     seed: int = 0
     """Seed of all draws."""
-    cluster: clusters.Flag = ""
-    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece."""
     runs: Path = Path("runs")
     """Folder of all runs; also holds the data set."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
+    pieces: Annotated[pieces.Pieces, tyro.conf.arg(name="")] = field(default_factory=pieces.Pieces)
     quiet: flags.Quiet = False
     json: bool = False
     """Print the summary as JSON."""
@@ -54,8 +49,7 @@ class Data:
         from dextron_bench.storage import hashing
         from dextron_bench.success import generation, sharing
 
-        clusters.check(self.cluster, self.share, self.merge)
-        share = shares.parse(self.share, self.merge)
+        share = self.pieces.parsed()
         files = {hashing.sha256(file): file for file in self.policies}
         agents = {name: weights.load_agent_from_file(file) for name, file in files.items()}
         config = generation.DatasetConfig(self.reaches, self.seed, tuple(agents))
@@ -66,10 +60,10 @@ class Data:
                 count = sharing.generate_share(
                     source, train, config, folder, self.rows, agents, share, self.threads, progress
                 )
-            return shares.print_done(share, f"{count} blocks", folder)
-        if self.merge:
+            return pieces.print_done(share, f"{count} blocks", folder)
+        if self.pieces.merge:
             sharing.check_complete(folder, config, self.rows)
-        if self.cluster:
+        if self.pieces.cluster:
             self._play_on_cluster(config, folder, files)
         with progress_bar("transitions", self.quiet) as progress:
             tallies = generation.generate(source, train, config, folder, self.rows, agents, self.threads, progress)
@@ -85,7 +79,7 @@ class Data:
         from dextron_bench.cluster import datasets
 
         with (
-            clusters.connected(self.cluster, self.runs, self.threads) as cluster,
+            pieces.connected(self.pieces.cluster, self.runs, self.threads) as cluster,
             progress_bar("transitions", self.quiet) as progress,
         ):
             datasets.play_blocks(cluster, config, folder, self.runs, self.rows, policies, progress)

@@ -43,7 +43,7 @@ def with_method_settings(names: Sequence[str], words: Sequence[str], command: An
     from dextron_bench.methods import registry
     from dextron_bench.methods.settings import settings_class
 
-    flags = {field.name for field in dataclasses.fields(command)} - {FIELD}
+    flags = set(_flags(command)) - {FIELD}
     method = settings_class(registry.find_method(spec), taken=flags)
     if method is None:
         return command
@@ -91,6 +91,16 @@ def _agent_spec(words: Sequence[str], command: Any) -> str | None:
         return None
     is_help = any(word in streams.HELP for word in words)
     return words[0] if is_help or usage.unknown_flags(words, usage.flags(command)) else None
+
+
+def _flags(command: Any) -> Iterator[str]:
+    """Names of the flags of a command; a field whose default is made by a dataclass is a group of flags."""
+    for field in dataclasses.fields(command):
+        group = field.default_factory
+        if dataclasses.is_dataclass(group):
+            yield from _flags(group)
+        else:
+            yield field.name
 
 
 def _method_spec(arguments: Sequence[str]) -> str | None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.support import clusters, flags
+from dextron_bench.cli.support import flags, pieces
 from dextron_bench.cli.support.output import progress_bar
 from dextron_bench.reaches.sources import SourceName
 
@@ -61,12 +61,6 @@ class BoardFlags(SubmissionFlags):
     """With --all: also draw the fresh settings of every row again from its beacon; this takes minutes for each."""
     stamp: bool = False
     """With --all: give baselines that ran again completely the tier `re-run`, and build the leaderboard."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """With --all: do only a part of the work; 0/2 and 1/2 are its halves (docs/many-machines.md)."""
-    merge: bool = False
-    """With --all: only put together what shares have done; if anything is missing, this is an error that names it."""
-    cluster: clusters.Flag = ""
-    """With --all: check the rows on a cluster with Ray: on this machine, on the cluster it belongs to, or on another
-    one."""
+    pieces: Annotated[pieces.Pieces, tyro.conf.arg(name="")] = field(default_factory=pieces.Pieces)
     runs: Path = Path("runs")
     """Folder of all runs; the findings of shares are in its folder `verify`."""
