@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from baselines.floors import Nothing
+from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.splits.rows import Rows
 from dextron_bench.storage import folder_config, tensors
+from dextron_bench.success import generation
 from dextron_bench.success.dataset import BadDataset
 from dextron_bench.success.generation import (
     POLICY,
@@ -73,8 +76,23 @@ def test_a_block_holds_the_played_episodes_in_float32(tmp_path: Path):
     assert block["states"].shape == (block["starts"][-1], 48)
     assert block["states"].dtype == block["actions"].dtype == np.float32
     np.testing.assert_array_equal(block["actions"][block["starts"][:-1]], 0.0)  # An expert's first action.
-    bytes_per_row = block_file(tmp_path, 0).stat().st_size / len(block["actions"])
-    assert bytes_per_row < 200 or len(block["actions"]) < 1000
+    header = block_file(tmp_path, 0).stat().st_size - sum(array.nbytes for array in block.values())
+    assert sum(array.nbytes for array in (block["states"], block["actions"])) == 4 * 49 * len(block["actions"])
+    assert 0 < header < 1000  # Nothing else is in the file.
+
+
+def test_only_an_episode_with_the_whole_return_is_labelled_a_success(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Most failures score more than 0: the bottle was up, and fell before the countdown was over."""
+
+    def rollout(agent: object, source: object, rows: Rows, threads: int) -> Iterator[tuple[int, Episode]]:
+        for row, score in enumerate((20.0, 19.0, 1.0, 0.0, 20.0)):
+            rewards = np.array([score, 0.0])
+            yield row, Episode(rows.case(row).setting, np.zeros((3, 48)), np.zeros((2, 1)), rewards, False, True)
+
+    monkeypatch.setattr(generation, "rollout", rollout)
+    tallies = generate_small(tmp_path, 1)
+    assert tensors.read(block_file(tmp_path, 0))["solved"].tolist() == [1, 0, 0, 0, 1]
+    assert tallies[SOLVED] == Tally(rows=10, episodes=5, solved=2)
 
 
 def test_a_folder_of_another_data_set_is_refused(tmp_path: Path):

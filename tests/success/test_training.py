@@ -48,6 +48,14 @@ def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path,
         train(tmp_path / "continued", replace(SHORT, epochs=1))
 
 
+def test_the_learning_rate_is_halved_every_hundred_epochs(tmp_path: Path, rates: list[float]):
+    """Table II; here every two."""
+    assert TrainingConfig() == TrainingConfig(batch=1024, learning_rate=1e-3, halved_every=100)
+    write_block(tmp_path, 0, [30] * 10, [0, 1] * 5)
+    train(tmp_path, TrainingConfig(epochs=5, updates=1, batch=8, halved_every=2))
+    assert rates == [1e-3, 1e-3, 5e-4, 5e-4, 2.5e-4]
+
+
 def test_the_model_keeps_its_learning_curve_and_its_best_epoch(trained: Path):
     about = tensors.read_about(trained / MODEL)
     assert [point["epoch"] for point in about["curve"]] == [1, 2]
