@@ -103,7 +103,7 @@ def test_every_command_of_every_step_is_one_that_the_command_line_accepts():
 def makes(step: Step) -> list[str]:
     """Patterns of the files that a step makes."""
     published = [f"leaderboard/results/{name}/*/*.json" for name in step.publishes]
-    weights = [f"{rebuild_steps.WEIGHTS}/{name}/*.safetensors" for name in step.publishes]
+    weights = [f"{rebuild_steps.WEIGHTS}/{name}/seed*.safetensors" for name in step.publishes]
     return [*step.makes, *(place for _, place in step.copies), *weights, *published]
 
 
@@ -111,7 +111,7 @@ def overlap(one: str, other: str) -> bool:
     """True if one file can match both patterns: names are compared folder by folder."""
     pairs = list(zip(one.split("/"), other.split("/"), strict=False))
     return one.count("/") == other.count("/") and all(
-        fnmatch(a.replace("*", "0"), b) or fnmatch(b.replace("*", "0"), a) for a, b in pairs
+        fnmatch(a.replace("*", "x"), b) or fnmatch(b.replace("*", "x"), a) for a, b in pairs
     )
 
 

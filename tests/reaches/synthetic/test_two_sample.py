@@ -10,6 +10,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from dextron_bench.cli import main
 from dextron_bench.cli.data.likeness import print_likeness
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import cache as recorded_cache
+from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.synthetic import two_sample, two_sample_held_out
 from dextron_bench.reaches.synthetic.generator import generate
 from dextron_bench.reaches.synthetic.parameters import load, shipped_parameters
@@ -225,10 +227,12 @@ def test_a_single_feature_shows_a_change_of_duration(reaches: list[Reach]):
 
 
 @pytest.mark.slow
-def test_fit_reproduces_the_shipped_model(release: Path, tmp_path: Path):
+def test_fit_reproduces_the_shipped_model(opened: Callable[[str], Source], tmp_path: Path):
     """Numbers agree except for rounding, and except for the signs of components, which are arbitrary."""
     file = tmp_path / "new" / "model.npz"
-    done = shell(["-m", "tools.fit_synthetic", "--into", str(file)], tmp_path, DEXTRON_DATA=str(release))
+    opened("real")
+    places = {"DEXTRON_CACHE": str(recorded_cache.cache_folder()), "DEXTRON_DATA": os.environ.get("DEXTRON_DATA", "")}
+    done = shell(["-m", "tools.fit_synthetic", "--into", str(file)], tmp_path, **places)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"{file}: {file.stat().st_size:,} bytes, ")
     assert "shipped file" in done.stdout
