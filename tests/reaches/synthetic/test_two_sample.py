@@ -34,6 +34,7 @@ from dextron_bench.reaches.synthetic.two_sample_features import (
     single_feature_aucs,
     summaries,
 )
+from tools import fit_synthetic
 from tools.fit_synthetic import compared
 
 STUDY = """
@@ -181,18 +182,28 @@ def test_without_scikit_learn_the_error_says_how_to_install_it(
     assert "pip install scikit-learn" in printed.err
 
 
-@pytest.mark.parametrize("command", ["fit", "likeness"])
+def likeness(*words: str) -> int:
+    """The exit code of `data likeness`."""
+    return main.main(["data", "likeness", *words])
+
+
+def fit_command(*words: str) -> int:
+    """The exit code of `python -m tools.fit_synthetic`."""
+    return fit_synthetic.main(words)
+
+
+@pytest.mark.parametrize("command", [fit_command, likeness])
 def test_without_recordings_the_error_says_how_to_get_them(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: Callable[..., int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.delenv("DEXTRON_DATA", raising=False)
     monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
-    assert main.main(["data", command]) == 2
+    assert command() == 2
     printed = capsys.readouterr()
     assert (printed.out, printed.err.count("\n")) == ("", 1)
     assert "data import --from" in printed.err
-    assert main.main(["data", command, "--seed", "-1"]) == 2
+    assert command("--seed", "-1") == 2
     assert "--seed is -1; it must be 0 or more" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
