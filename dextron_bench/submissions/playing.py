@@ -45,31 +45,27 @@ def prepare_all(entry: Entry, runs: Path, record: int, limits: Limits, threads: 
     A piece of an evaluation is a whole split, since its rows are shuffled. Raises BadBundle if a bundle could not hold
     the entry, FolderMismatch, MissingData.
     """
-    bundle.check({"format": bundle.FORMAT, **entry.manifest(), "files": {}}, "bundle", entry.folder(runs))
-    bundle.check_agent(entry.files())
+    launch, manifest, files = entry.launch, entry.manifest(), entry.files()
+    bundle.check({"format": bundle.FORMAT, **manifest, "files": {}}, "bundle", entry.folder(runs))
+    bundle.check_agent(files)
     source = sources.open_source(entry.reaches)
-    return [
-        _prepare(entry, source, RunFolder.of_seed(entry.folder(runs), seed), record, limits, threads)
-        for seed in entry.seeds
-    ]
-
-
-def _prepare(
-    entry: Entry, source: Source, folder: RunFolder, record: int, limits: Limits, threads: int
-) -> EvaluationJob:
-    """The evaluation of one seed."""
     splits = [load_split(entry.reaches, name) for name in ranking_splits(entry.reaches)]
-    config = _config(entry, folder.seed)
-    folder_config.write_or_check(folder.path, config)
-    about = {"method": entry.name, "reaches": entry.reaches, "seed": folder.seed}
-
-    def play(split: Split, rows: range) -> Played:
-        return play_shuffled(entry.launch, source, split, folder.seed, limits, threads)
-
+    hashes = {name: hashing.sha256(file) for name, file in files.items()}
+    common = {name: manifest[name] for name in ("agent", "reaches", "physics")} | {"method": entry.name}
     code = provenance.code_hash()
-    return EvaluationJob(
-        folder, source, splits, play, record, about, about, config, code, one_platform=True, threads=threads
-    )
+
+    def job(seed: int) -> EvaluationJob:
+        def play(split: Split, rows: range) -> Played:
+            return play_shuffled(launch, source, split, seed, limits, threads)
+
+        folder, config = RunFolder.of_seed(entry.folder(runs), seed), {**common, "seed": seed, "files": hashes}
+        folder_config.write_or_check(folder.path, config)
+        about = {"method": entry.name, "reaches": entry.reaches, "seed": seed}
+        return EvaluationJob(
+            folder, source, splits, play, record, about, about, config, code, one_platform=True, threads=threads
+        )
+
+    return [job(seed) for seed in entry.seeds]
 
 
 def play_shuffled(
@@ -91,12 +87,3 @@ def row_order(split: Split, seed: int) -> np.ndarray:
 def write_bundle(entry: Entry, folder: Path, file: Path) -> dict[str, Any]:
     """Writes the bundle of an entry whose runs are complete; returns its manifest."""
     return bundle.pack(folder, entry.manifest(), entry.files(), file)
-
-
-def _config(entry: Entry, seed: int) -> dict[str, Any]:
-    """What the run of a seed depends on."""
-    manifest = entry.manifest()
-    hashes = {name: hashing.sha256(file) for name, file in entry.files().items()}
-    return {name: manifest[name] for name in ("agent", "reaches", "physics")} | {
-        "method": entry.name, "seed": seed, "files": hashes
-    }  # fmt: skip
