@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from dextron_bench.cli.leaderboard.show import print_beside_published
-from dextron_bench.cli.support import shares
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import progress_bar
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces
 from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
+    from dextron_bench.runs.evaluation_job import EvaluationJob
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,7 @@ class Eval:
     """Folder of all runs."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
+    pieces: Pieces = field(default_factory=PieceFlags)
     quiet: bool = False
     """Show no progress."""
     json: bool = False
@@ -57,12 +55,14 @@ class Eval:
     def __call__(self) -> int:
         from dextron_bench.runs import execution, result_files
 
-        share, runs, folder = shares.parse(self.share, self.merge), self._runs(), self.runs / "eval"
-        if share is not None or self.merge:
-            jobs = [execution.prepare(run, folder, self.threads) for run in runs]
-            if share is not None:
-                return shares.play_jobs(jobs, share, folder, self.quiet)
-            shares.check_jobs(jobs)
+        self.pieces.check()
+        runs, folder = self._runs(), self.runs / "eval"
+
+        def works() -> list[EvaluationJob]:
+            return [execution.prepare(run, folder, self.threads) for run in runs]
+
+        if self.pieces.play(works, folder, self.threads, self.quiet):
+            return DONE
         results = []
         for run in runs:
             with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:

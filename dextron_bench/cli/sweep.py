@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from dextron_bench.cli.support import clusters
+from dextron_bench.cli.support import pieces
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
@@ -58,7 +58,7 @@ class Sweep:
     """The name of the sweep; by default the method's name and a hash of what is asked."""
     show: bool = False
     """Run nothing: show this sweep, the one of --name, or a list of all."""
-    cluster: clusters.Flag = ""
+    cluster: pieces.Cluster = ""
     """Do the trials of a grid or a random search side by side on a cluster with Ray: on this machine, on the cluster it
     belongs to, or on another one."""
     into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
@@ -83,7 +83,7 @@ class Sweep:
             return self._show_all() if not self.name else self._print(SweepFile.of(self.runs, self.name))
         if not self.method:
             raise BadSweep("give --method, or --show to see the sweeps in the folder of runs")
-        clusters.check(self.cluster)
+        pieces.check_cluster(self.cluster)
         question = self._question()
         file = SweepFile.of(self.runs, self.name or default_name(question))
         self._check_picture(space.as_json(question.space))
@@ -114,7 +114,7 @@ class Sweep:
                 "earlier ones: leave those out, or leave out --cluster"
             )
         groups = execution.runs_ahead(question, file, self.trials, self.runs)
-        with clusters.connected(self.cluster, self.runs, self.threads) as cluster:
+        with pieces.connected(self.cluster, self.runs, self.threads) as cluster:
             with progress_bar("epochs", self.quiet) as progress:
                 groups = trials.train(cluster, groups, self.runs, self.device, progress)
             with progress_bar("pieces", self.quiet) as progress:

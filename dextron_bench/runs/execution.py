@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,16 @@ from dextron_bench.methods.agents import Agent, Privileged, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import Source
-from dextron_bench.runs import playing, result_files, run_files
+from dextron_bench.runs import plans, playing, result_files, run_files
 from dextron_bench.runs.evaluation_job import EvaluationJob, Played
 from dextron_bench.runs.plans import Run, no_weights
 from dextron_bench.splits.loading import Split, load_split
 from dextron_bench.storage import folder_config, provenance
+from dextron_bench.storage.pieces import Place, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.training import loop
+
+WEIGHTS = "weights"  # Folder below the runs of another process, with the file of weights.
 
 
 class NotTrained(LookupError):
@@ -48,7 +52,7 @@ def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progre
     """Trains and evaluates what the run's folder does not hold yet; returns the folder, with its `result.json`.
 
     `report` receives the episodes of each split. Raises FolderMismatch, DamagedFile, UnknownSplit, MissingData,
-    AgentError, MissingWeights, and the errors of `shares.Work.read`.
+    AgentError, MissingWeights, and the errors of `EvaluationJob.table`.
     """
     source, splits = _played(run)  # Splits or data that are missing end the command before the training.
     training = run.training_job(runs)
@@ -94,7 +98,7 @@ def _prepare(run: Run, runs: Path, source: Source, splits: Sequence[Split], thre
     facts = run.about | (_training_facts(run, folder.weights, sha256) if sha256 else {})
     facts |= {"privileged": "each setting's expert"} if isinstance(player, Privileged) else {}
     return EvaluationJob(
-        folder,
+        folder.path,
         source,
         splits,
         play,
@@ -103,9 +107,25 @@ def _prepare(run: Run, runs: Path, source: Source, splits: Sequence[Split], thre
         facts,
         config | {"weights": sha256},
         provenance.code_hash(*registry.package_files(type(run.method))),
+        _recipe(run, file),
         getattr(player, "rows_are_independent", False) is True,
         threads=threads,
     )
+
+
+def _recipe(run: Run, file: Path | None) -> Recipe:
+    """How another process makes the evaluation of a run, with a file of weights."""
+    plan, files = plans.without_file(run.plan)
+    files |= {f"{WEIGHTS}/{file.name}": file} if file else {}
+    arguments = {"plan": replace(plan, weights=Path(file.name) if file else None), "label": run.label}
+    return Recipe(_prepare_again, arguments, run.source, files)
+
+
+def _prepare_again(place: Place, plan: plans.Plan, label: str) -> EvaluationJob:
+    """The evaluation of a plan whose files another process has put below the folder of runs."""
+    run = replace(plans.resolve(plans.with_file(replace(plan, weights=None), place.runs)), label=label)
+    run = run.with_weights(plan.seed, place.runs / WEIGHTS / plan.weights) if plan.weights else run
+    return prepare(run, place.runs, place.threads)
 
 
 def agents(run: Run, file: Path | None) -> Callable[[], Agent]:

@@ -15,8 +15,10 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import result_files
 from dextron_bench.runs.evaluation_job import EvaluationJob, Played
+from dextron_bench.runs.plans import ENTRANT
 from dextron_bench.splits.loading import Split, load_split, ranking_splits
 from dextron_bench.storage import folder_config, hashing, provenance
+from dextron_bench.storage.pieces import Place, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle
@@ -61,11 +63,31 @@ def prepare_all(entry: Entry, runs: Path, record: int, limits: Limits, threads: 
         folder, config = RunFolder.of_seed(entry.folder(runs), seed), {**common, "seed": seed, "files": hashes}
         folder_config.write_or_check(folder.path, config)
         about = {"method": entry.name, "reaches": entry.reaches, "seed": seed}
+        arguments = {"entry": entry.in_folder(Path()), "record": record, "limits": limits, "seed": seed}
+        made = Recipe(_prepare_again, arguments, entry.reaches, {f"{ENTRANT}/{name}": files[name] for name in files})
         return EvaluationJob(
-            folder, source, splits, play, record, about, about, config, code, one_platform=True, threads=threads
+            folder.path,
+            source,
+            splits,
+            play,
+            record,
+            about,
+            about,
+            config,
+            code,
+            made,
+            one_platform=True,
+            threads=threads,
         )
 
     return [job(seed) for seed in entry.seeds]
+
+
+def _prepare_again(place: Place, entry: Entry, record: int, limits: Limits, seed: int) -> EvaluationJob:
+    """The evaluation of a seed of an entry whose files another process has put below the folder of runs."""
+    entry = entry.in_folder(place.runs / ENTRANT)
+    jobs = prepare_all(entry, place.runs, record, limits, place.threads)
+    return next(job for job in jobs if job.folder.seed == seed)
 
 
 def play_shuffled(

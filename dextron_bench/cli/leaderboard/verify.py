@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.support import clusters, shares
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import print_table, progress_bar
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces
 from dextron_bench.reaches.sources import SourceName
 from dextron_bench.storage.printable import printable, printable_line
 
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 class Verify:
     """Verify a submission: replay its actions and compare all its claims with the replayed episodes.
 
-    With --all, verify every row of a leaderboard: replay the actions of submissions, and run the baselines again.
+    With --all, verify every row of a leaderboard: replay the actions of submissions, and run the baselines again. Only
+    this can be done in shares or on a cluster.
 
     Example: dextron-bench leaderboard verify my-agent-synthetic.zip
     """
@@ -55,13 +56,7 @@ class Verify:
     """With --rerun: how many fresh settings of each split its agent plays; 0 means as many as the split has."""
     board: Path = Path("leaderboard")
     """Folder of the leaderboard."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """With --all: do only a part of the work; 0/2 and 1/2 are its halves (docs/many-machines.md)."""
-    merge: bool = False
-    """With --all: only put together what shares have done; if anything is missing, this is an error that names it."""
-    cluster: clusters.Flag = ""
-    """With --all: check the rows on a cluster with Ray: on this machine, on the cluster it belongs to, or on another
-    one."""
+    pieces: Pieces = field(default_factory=PieceFlags)
     runs: Path = Path("runs")
     """Folder of all runs; the findings of shares are in its folder `verify`."""
     threads: int = 0
@@ -72,21 +67,17 @@ class Verify:
     def __call__(self) -> int:
         from dextron_bench.cli.leaderboard import board_verification
         from dextron_bench.leaderboard import verify_board
+        from dextron_bench.storage.shares import BadShare
 
-        clusters.check(self.cluster, self.share, self.merge)
-        share = shares.parse(self.share, self.merge)
+        self.pieces.check()
         if self.all and self.bundle is not None:
             raise verify_board.NothingToVerify(
                 f"--all verifies the leaderboard's own rows: leave out {self.bundle}, or leave out --all"
             )
         if not self.all and self.bundle is None:
             raise verify_board.NothingToVerify("give a submission, or --all for the leaderboard's own rows")
-        if self.bundle is not None and (share is not None or self.merge or self.cluster):
-            raise shares.BadShare(
-                "--share, --merge and --cluster need --all: the verification of a submission is one piece"
-            )
-        if share is not None:
-            return board_verification.verify_share(self, share)
+        if self.bundle is not None and self.pieces.given:
+            raise BadShare("--share, --merge and --cluster need --all: the verification of a submission is one piece")
         if self.bundle is None:
             return board_verification.verify_board(self)
         with unpacked(self.bundle) as opened:
