@@ -57,7 +57,7 @@ class SearchWork(BlockWork):
         return Recipe(open_work, {"search": self.search, "rows": self.goal}, self.search.reaches)
 
     def amounts(self) -> dict[int, int]:
-        """How many rows are solved in each block, those of shares too; raises DamagedBlock."""
+        """How many rows are solved in each block, also in pieces; raises DamagedBlock."""
         return {number: tally.solved for number, tally in self._tallies(self.block_files()).items()}
 
     def play_blocks(self, numbers: Iterable[int]) -> Iterator[list[Path]]:

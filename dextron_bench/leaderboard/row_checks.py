@@ -27,7 +27,7 @@ NOT_NEEDED = (".rrd",)
 
 @dataclass(frozen=True)
 class RowChecks(ListedWork):
-    """The checks of some rows of a board, in the folder `place`. The other fields are those of `verify_board.check`."""
+    """The checks of some rows of a board, in the folder `place`. `verify_board.check` explains the other fields."""
 
     place: Path
     board: Path

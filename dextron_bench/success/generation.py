@@ -153,7 +153,7 @@ class Generation(BlockWork):
         return Recipe(open_generation, {"config": self.config, "rows": self.goal}, self.config.reaches, files)
 
     def amounts(self) -> dict[int, int]:
-        """How many transitions each block has, those of shares too."""
+        """How many transitions each block has, also in pieces."""
         return {number: int(tensors.read_about(file)["rows"]) for number, file in self.block_files().items()}
 
     def play_blocks(self, numbers: Iterable[int]) -> Iterator[list[Path]]:

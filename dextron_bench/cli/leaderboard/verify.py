@@ -138,14 +138,14 @@ def _verify(opened: tuple[Path, dict[str, Any]], flags: Verify | Add) -> Verdict
     from dextron_bench.splits.fresh_settings import FreshSettings
     from dextron_bench.storage import hashing
     from dextron_bench.submissions import verification
+    from dextron_bench.submissions.seed_check import Playing
 
     assert flags.bundle is not None
     drawn = {"submission": hashing.sha256(flags.bundle), "rows": flags.fresh_rows}
     fresh = FreshSettings(**drawn, beacon=flags.beacon) if flags.beacon else FreshSettings(**drawn)
     with progress_bar("verifying", flags.quiet) as progress:
-        return verification.verify(
-            *opened, flags.board, flags.rerun, flags.threads, trust=flags.trust, fresh=fresh, report=progress
-        )
+        how = Playing(trust=flags.trust, threads=flags.threads, report=progress)
+        return verification.verify(*opened, flags.board, how, flags.rerun, fresh)
 
 
 def print_verdict(verdict: Verdict) -> int:
