@@ -74,8 +74,9 @@ def prepare(run: Run, runs: Path, threads: int = 0) -> EvaluationJob:
 
 
 def _played(run: Run) -> tuple[Source, list[Split]]:
-    """The source of reaches and the splits that a run plays."""
-    return sources.open_source(run.source), [load_split(run.source, name) for name in run.splits]
+    """The source of reaches and the splits that a run plays; raises UnknownSplit, MissingData."""
+    splits = [load_split(run.source, name) for name in run.splits]
+    return sources.open_source(run.source), splits
 
 
 def _prepare(run: Run, runs: Path, source: Source, splits: Sequence[Split], threads: int) -> EvaluationJob:
