@@ -9,7 +9,7 @@ import pytest
 
 from baselines.floors import Nothing
 from dextron_bench.storage import shares
-from dextron_bench.storage.pieces import ForeignPiece
+from dextron_bench.storage.pieces import ForeignPiece, Place
 from dextron_bench.success import generation
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.tiny_runs import forbidden
@@ -53,3 +53,20 @@ def test_a_piece_of_another_data_set_is_refused(tmp_path: Path):
     (tmp_path / "a" / "search.json").unlink()
     with pytest.raises(ForeignPiece, match=r"000000.json is a piece of other work: it differs in search \(seed\)"):
         work_in(tmp_path / "a", other).check_complete()
+
+
+def test_another_process_reads_the_weights_of_policies_from_its_folder_of_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The recipe sends each file by the policy's name, and names no path of this machine."""
+    read: list[Path] = []
+    monkeypatch.setattr(generation.weights, "load_agent_from_file", lambda file: read.append(file) or object())
+    monkeypatch.setattr(generation, "load_split", lambda reaches, name: TRAIN)
+    monkeypatch.setattr(generation, "open_source", lambda reaches: SOURCE)
+    here, there = Place(tmp_path, tmp_path / "data", 1), Place(tmp_path / "node", tmp_path / "node" / "data", 1)
+    work = generation.open_generation(here, SMALL, ROWS, {"nothing": tmp_path / "a.safetensors"})
+    recipe = work.recipe("000000")
+    assert recipe.files == {"policies/nothing": tmp_path / "a.safetensors"}
+    again = recipe.make(there, **recipe.arguments)
+    assert read == [tmp_path / "a.safetensors", tmp_path / "node" / "policies" / "nothing"]
+    assert (again.config, again.goal, again.place) == (SMALL, ROWS, tmp_path / "node" / "data")
