@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.support import flags, pieces
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import progress_bar
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces
 from dextron_bench.cli.support.standings import print_beside_published
 
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
+    from dextron_bench.runs.evaluation_job import EvaluationJob
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Eval:
     """How many episodes of each split to record, from the first."""
     runs: flags.Runs = flags.RUNS
     threads: flags.Threads = 0
-    pieces: Annotated[pieces.Shares, tyro.conf.arg(name="")] = field(default_factory=pieces.Shares)
+    pieces: Pieces = field(default_factory=PieceFlags)
     quiet: flags.Quiet = False
     json: bool = False
     """Print the rows as JSON."""
@@ -47,12 +49,14 @@ class Eval:
     def __call__(self) -> int:
         from dextron_bench.runs import execution, result_files
 
-        share, runs, folder = self.pieces.parsed(), self._runs(), self.runs / "eval"
-        if share is not None or self.pieces.merge:
-            jobs = [execution.prepare(run, folder, self.threads) for run in runs]
-            if share is not None:
-                return pieces.play_jobs(jobs, share, folder, self.quiet)
-            pieces.check_jobs(jobs)
+        self.pieces.check()
+        runs, folder = self._runs(), self.runs / "eval"
+
+        def works() -> list[EvaluationJob]:
+            return [execution.prepare(run, folder, self.threads) for run in runs]
+
+        if self.pieces.play(works, folder, self.threads, self.quiet):
+            return DONE
         results = []
         for run in runs:
             with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from dextron_bench.cli.support import flags, pieces
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import print_json, print_table, print_warning, progress_bar
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces, connected, play_on
 from dextron_bench.cli.support.standings import print_beside_published
 
 TrackerName = Literal["rerun", "tensorboard", "trackio", "wandb"]
@@ -19,7 +20,6 @@ TrackerName = Literal["rerun", "tensorboard", "trackio", "wandb"]
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
     from dextron_bench.runs.evaluation_job import EvaluationJob
-    from dextron_bench.storage.shares import Share
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Run:
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
     depend on it."""
     device: flags.Device = "cpu"
-    pieces: Annotated[pieces.Pieces, tyro.conf.arg(name="")] = field(default_factory=pieces.Pieces)
+    pieces: Pieces = field(default_factory=PieceFlags)
     dry_run: bool = False
     """Only print what is left to do and an estimate of the time."""
     quiet: flags.Quiet = False
@@ -66,15 +66,14 @@ class Run:
             from dextron_bench.tracking import packages
 
             packages.require(self.tracker)
-        share, groups = self.pieces.parsed(), self._groups()
+        self.pieces.check()
+        groups = self._groups()
         if self.dry_run:
             return self._estimate(groups)
-        if share is not None:
-            return self._play(share, groups)
-        if self.pieces.merge:
-            pieces.check_jobs(self._jobs(groups))
         if self.pieces.cluster:
             self._play_on_cluster(groups)
+        elif self.pieces.play(lambda: self._jobs(groups), self.runs, self.threads, self.quiet):
+            return DONE
         return self._execute(groups)
 
     def _jobs(self, groups: list[list[plans.Run]]) -> list[EvaluationJob]:
@@ -82,19 +81,14 @@ class Run:
 
         return [execution.prepare(run, self.runs, self.threads) for group in groups for run in group]
 
-    def _play(self, share: Share, groups: list[list[plans.Run]]) -> int:
-        """Plays the pieces of a share."""
-        return pieces.play_jobs(self._jobs(groups), share, self.runs, self.quiet)
-
     def _play_on_cluster(self, groups: list[list[plans.Run]]) -> None:
         """Trains and plays on a cluster what the folder of runs lacks."""
-        from dextron_bench.cluster import evaluations, trainings
+        from dextron_bench.cluster import trainings
 
-        with pieces.connected(self.pieces.cluster, self.runs, self.threads) as cluster:
+        with connected(self.pieces.cluster, self.runs, self.threads) as cluster:
             with progress_bar("epochs", self.quiet) as progress:
                 trainings.train(cluster, groups, self.runs, self.device, progress)
-            with progress_bar("pieces", self.quiet) as progress:
-                evaluations.play(cluster, [run for group in groups for run in group], self.runs, progress)
+            play_on(cluster, self._jobs(groups), self.quiet)
 
     def _groups(self) -> list[list[plans.Run]]:
         """The runs of each method, one for each seed."""

@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.support import flags, pieces
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import changed_settings
 from dextron_bench.cli.support.output import progress_bar
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces
 from dextron_bench.cli.support.standings import print_rows
 from dextron_bench.submissions.declaration import Declaration
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dextron_bench.methods.isolation.isolated_agent import Limits
+    from dextron_bench.runs.evaluation_job import EvaluationJob
     from dextron_bench.submissions.entry import Entry
 
 
@@ -60,11 +61,13 @@ class Submit:
     threads: int = 0
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
     depend on it."""
-    pieces: Annotated[pieces.Pieces, tyro.conf.arg(name="")] = field(default_factory=pieces.Pieces)
+    pieces: Pieces = field(default_factory=PieceFlags)
     quiet: flags.Quiet = False
     method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
+        from dextron_bench.cluster.tasks import BadCluster
+        from dextron_bench.methods import specs
         from dextron_bench.methods.isolation.isolated_agent import Limits
         from dextron_bench.runs import run_files
         from dextron_bench.scores import cells
@@ -74,14 +77,15 @@ class Submit:
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
-        share = self.pieces.parsed()
-        if share is not None or self.pieces.merge:
-            jobs = playing.prepare_all(entry, self.runs, self.record, limits, self.threads)
-            if share is not None:
-                return pieces.play_jobs(jobs, share, self.runs, self.quiet)
-            pieces.check_jobs(jobs)
-        if self.pieces.cluster:
-            self._play_on_cluster(entry, limits)
+        self.pieces.check()
+
+        def works() -> list[EvaluationJob]:
+            if self.pieces.cluster and specs.parse(entry.spec).kind == "command":
+                raise BadCluster(f"{entry.spec} lies on this machine alone: use --share on machines that have it")
+            return playing.prepare_all(entry, self.runs, self.record, limits, self.threads)
+
+        if self.pieces.play(works, self.runs, self.threads, self.quiet):
+            return DONE
         with progress_bar(entry.name, self.quiet) as progress:
             folder = playing.play_entry(entry, self.runs, self.record, limits, self.threads, progress)
         playing.write_bundle(entry, folder, file)
@@ -93,15 +97,6 @@ class Submit:
             f"{file}: verify it with `dextron-bench leaderboard verify {file}`, then send it in (docs/leaderboard.md)"
         )
         return EPISODES_FAILED if failures else DONE
-
-    def _play_on_cluster(self, entry: Entry, limits: Limits) -> None:
-        from dextron_bench.cluster import submissions
-
-        with (
-            pieces.connected(self.pieces.cluster, self.runs, self.threads) as cluster,
-            progress_bar(f"{entry.name}, pieces", self.quiet) as progress,
-        ):
-            submissions.play(cluster, entry, self.runs, self.record, limits, progress)
 
     def _entry(self) -> Entry:
         from dextron_bench.submissions import entry as submission_entry

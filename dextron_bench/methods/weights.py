@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,14 @@ def seed_of(file: Path) -> int:
 
 def load_agent(learner: Learner, file: Path) -> Agent:
     """The agent of a file's weights, tried on one state; raises BadWeights, BadTensors, OSError."""
+    return load_agents(learner, file)()
+
+
+def load_agents(learner: Learner, file: Path) -> Callable[[], Agent]:
+    """Makes agents of a file's weights, which are read once and tried on one state.
+
+    Raises BadWeights, BadTensors, OSError.
+    """
     arrays = tensors.read(file)
     label = tensors.read_about(file).get("label", learner.label)
     if label != learner.label:
@@ -86,7 +95,7 @@ def load_agent(learner: Learner, file: Path) -> Agent:
         ) from error
     if shape != (1, 1):
         raise BadWeights(f"{file} holds no weights that fit {learner.label!r}: actions of shape {shape} for one state")
-    return learner.policy(arrays)
+    return lambda: learner.policy(arrays)
 
 
 def load_agent_from_file(file: Path) -> Agent:

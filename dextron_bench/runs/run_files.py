@@ -37,10 +37,13 @@ def failures(folders: Iterable[RunFolder]) -> dict[str, int]:
 
 
 def copy_weights(file: Path, folder: RunFolder) -> str:
-    """Copies weights into the folder of a run; returns their SHA-256. Raises FolderMismatch if it holds others."""
-    sha256 = hashing.sha256(file)
+    """Copies weights into the folder of a run, and returns their SHA-256; each file is read once.
+
+    Raises FolderMismatch if the folder holds other weights.
+    """
     if not folder.weights.exists():
         atomic.write_atomically(folder.weights, lambda part: shutil.copyfile(file, part))
-    elif file != folder.weights and hashing.sha256(folder.weights) != sha256:
+    sha256 = hashing.sha256(folder.weights)
+    if file != folder.weights and hashing.sha256(file) != sha256:
         raise FolderMismatch(f"{folder.path} holds a run with other weights; {RUN_ADVICE}")
     return sha256

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.methods import registry
+from dextron_bench.methods import registry, specs
 from dextron_bench.methods.isolation.launch import Launch, prepare_launch
 from dextron_bench.submissions import bundle, names
 from dextron_bench.submissions.declaration import Declaration
@@ -82,3 +82,10 @@ class Entry:
     def files(self) -> dict[str, Path]:
         """The agent's own files, by name; with them it can run again."""
         return {file.name: file for file in (self.launch.spec.file, self.weights) if file}
+
+    def in_folder(self, folder: Path) -> Entry:
+        """The entry, with its files in a folder."""
+        spec = specs.parse(self.spec)
+        if spec.file is not None:
+            spec = replace(spec, location=str(folder / spec.file.name))
+        return replace(self, spec=str(spec), weights=folder / self.weights.name if self.weights else None)

@@ -110,13 +110,13 @@ def test_a_leaderboard_without_results_explains_how_to_make_some(here: Path, cap
 
 
 def test_a_search_prints_json(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    from dextron_bench.experts import montecarlo
+    from dextron_bench.experts.search_work import SearchWork
 
     draws = pd.DataFrame(
         [("a", 0.0, 0.0, 0.0, 1.0, 0.5, 20.0, 90)], columns=[*tiny_benchmark.COLUMNS[1:7], "score", "length"]
     )
-    monkeypatch.setattr(montecarlo, "run", lambda *_, **__: draws)
-    assert main.main(["data", "mc", "--json", "--quiet"]) == 0
+    monkeypatch.setattr(SearchWork, "run", lambda *_, **__: draws)
+    assert main.main(["mc", "--json", "--quiet"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["kept"], summary["solved"]) == (1, 1)
 

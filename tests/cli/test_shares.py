@@ -178,7 +178,7 @@ def test_a_share_that_was_killed_leaves_no_half_piece(here: Path, monkeypatch: p
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(evaluation_job.shares.Work, "write", killed)
+        patch.setattr(evaluation_job.EvaluationJob, "complete", killed)
         assert main.main([*words, "--share", "0/1"]) == 130
     assert [path.name for path in (here / "runs" / PIECES).iterdir()] == ["test-0000-0000.parquet"]
     play(words, "--share", "0/1")

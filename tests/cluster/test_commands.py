@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.cluster import ray_cluster, trainings, worker
-from dextron_bench.experts import montecarlo
+from dextron_bench.cluster import pieces, ray_cluster, trainings, worker
+from dextron_bench.cluster.tasks import OtherVersion
+from dextron_bench.experts import montecarlo, search_work
+from dextron_bench.storage.pieces import Place
 from dextron_bench.success import generation
 from tests.cli.test_shares import contents, on_machine
 from tests.cli.test_sweep import AGENT
@@ -81,6 +83,24 @@ def test_a_training_goes_on_task_by_task(here: Path, monkeypatch: pytest.MonkeyP
     play(*words, *CLUSTER)
     assert clusters[0].order.count(name) == 4
     assert tiny_training.contents(here / "runs") == tiny_training.contents(here / "whole")
+
+
+def test_an_evaluation_of_weights_in_a_file_has_the_same_bytes(here: Path):
+    """The weights and the file of the method go to the node, below its own folder of runs."""
+    play("run", "--method", TOY, "--preset", "smoke", "--quiet", "--split", "val", "--record", "0", "--threads", "1")
+    weights = ("--weights", here / "runs/toy-0.1/synthetic/seed0/weights.safetensors")
+    words = ("eval", "--method", TOY, "--preset", "smoke", "--quiet", "--split", "test", *weights)
+    play(*words, "--threads", "1", "--runs", "whole")
+    play(*words, "--runs", "clustered", *CLUSTER)
+    assert contents(here / "clustered") == contents(here / "whole")
+
+
+def test_a_piece_of_another_version_of_the_work_is_not_played(here: Path):
+    """The node has the same installation, and a search of another seed, so its blocks would be other ones."""
+    work = search_work.open_work(Place(here, here / "mc", 1), montecarlo.Search(), 3)
+    arguments = (here, 1, work.recipe("000000"), "mc", "000000", {"search": {"seed": 1}})
+    with pytest.raises(OtherVersion, match="another version of block 000000: it differs in search; install the same"):
+        pieces.play_piece(*arguments)
 
 
 def test_a_data_set_has_the_same_bytes(here: Path):

@@ -10,7 +10,6 @@ import tyro
 
 from dextron_bench.cli.support import verdicts
 from dextron_bench.cli.support.verification_flags import BoardFlags
-from dextron_bench.storage.shares import BadShare
 
 
 @dataclass(frozen=True)
@@ -31,18 +30,17 @@ class Verify(BoardFlags):
     def __call__(self) -> int:
         from dextron_bench.cli.leaderboard import board_verification
         from dextron_bench.leaderboard import verify_board
+        from dextron_bench.storage.shares import BadShare
 
-        share = self.pieces.parsed()
+        self.pieces.check()
         if self.all and self.bundle is not None:
             raise verify_board.NothingToVerify(
                 f"--all verifies the leaderboard's own rows: leave out {self.bundle}, or leave out --all"
             )
         if not self.all and self.bundle is None:
             raise verify_board.NothingToVerify("give a submission, or --all for the leaderboard's own rows")
-        if self.bundle is not None and (share is not None or self.pieces.merge or self.pieces.cluster):
+        if self.bundle is not None and self.pieces.given:
             raise BadShare("--share, --merge and --cluster need --all: the verification of a submission is one piece")
-        if share is not None:
-            return board_verification.verify_share(self, share)
         if self.bundle is None:
             return board_verification.verify_board(self)
         with verdicts.unpacked(self.bundle) as opened:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import functools
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,57 +11,87 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_warning, progress_bar
-from dextron_bench.storage import shares
 
 if TYPE_CHECKING:
     from dextron_bench.cluster.ray_cluster import RayCluster
-    from dextron_bench.runs.evaluation_job import EvaluationJob
+    from dextron_bench.storage.block_work import BlockWork
+    from dextron_bench.storage.pieces import ListedWork
 
-ClusterFlag = Annotated[str, tyro.conf.arg(metavar="local|auto|ray://HOST:PORT")]
+Cluster = Annotated[str, tyro.conf.arg(metavar="local|auto|ray://HOST:PORT")]
 
 
 @dataclass(frozen=True)
-class Shares:
-    """Which part of the work a command does; without its flags, all of it."""
+class PieceFlags:
+    """Which processes do the pieces of a command's work."""
 
     share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
     """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
     merge: bool = False
     """Only put together what shares have done; if anything is missing, this is an error that names it."""
-
-    def parsed(self) -> shares.Share | None:
-        """The share of the flags; None if there is none. Raises BadShare."""
-        if self.share and self.merge:
-            raise shares.BadShare(
-                "--share does a part of the pieces and --merge puts all of them together: give one of both"
-            )
-        return shares.Share.parse(self.share) if self.share else None
-
-
-@dataclass(frozen=True)
-class Pieces(Shares):
-    """Which part of the work a command does, and where; without its flags, all of it in this process."""
-
-    cluster: ClusterFlag = ""
+    cluster: Cluster = ""
     """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
 
-    def parsed(self) -> shares.Share | None:
-        """The share of the flags; None if there is none. Raises BadShare, BadCluster."""
+    @property
+    def given(self) -> bool:
+        """True if one of the flags is given."""
+        return bool(self.share or self.merge or self.cluster)
+
+    def check(self) -> None:
+        """Raises BadShare and BadCluster if the flags name no share or no cluster, or contradict each other."""
+        from dextron_bench.storage.shares import BadShare, Share
+
         check_cluster(self.cluster)
         if self.cluster and (self.share or self.merge):
-            from dextron_bench.cluster.tasks import BadCluster
-
-            raise BadCluster(
+            raise BadShare(
                 "--cluster does all pieces and puts them together: leave out --share and --merge, or leave out "
                 "--cluster"
             )
-        return super().parsed()
+        if self.share and self.merge:
+            raise BadShare("--share does a part of the pieces and --merge puts all of them together: give one of both")
+        if self.share:
+            Share.parse(self.share)
+
+    def play(self, works: Callable[[], Sequence[ListedWork]], runs: Path, threads: int, quiet: bool) -> bool:
+        """Plays what the flags ask for of works below a folder of runs; True if this was a share, which ends there.
+
+        Raises MissingPieces if pieces are missing for a merge, and the errors of the works.
+        """
+        from dextron_bench.storage import shares
+
+        if self.share:
+            share = shares.Share.parse(self.share)
+            _print_done(share, shares.play(works(), share, functools.partial(progress_bar, quiet=quiet)), runs)
+        if self.merge:
+            shares.check(works())
+        if self.cluster:
+            with connected(self.cluster, runs, threads) as cluster:
+                play_on(cluster, works(), quiet)
+        return bool(self.share)
+
+    def play_blocks(self, work: BlockWork, runs: Path, threads: int, quiet: bool) -> bool:
+        """Plays what the flags ask for of work whose pieces are blocks; as `play`."""
+        from dextron_bench.storage.shares import Share
+
+        if self.share:
+            share = Share.parse(self.share)
+            with progress_bar(f"blocks of share {share}", quiet) as progress:
+                _print_done(share, work.play_share(share, progress), work.place)
+        if self.merge:
+            work.check_complete()
+        if self.cluster:
+            from dextron_bench.cluster import pieces
+
+            with connected(self.cluster, runs, threads) as cluster, progress_bar(work.unit, quiet) as progress:
+                pieces.play_blocks(cluster, work, progress)
+        return bool(self.share)
+
+
+Pieces = Annotated[PieceFlags, tyro.conf.arg(name="")]  # The type of a field whose flags have no prefix.
 
 
 def check_cluster(cluster: str) -> None:
-    """Raises BadCluster if a text names no cluster; no cluster at all is fine."""
+    """Raises BadCluster if a flag names no cluster, or if Ray is not installed; a command without the flag is fine."""
     if cluster:
         from dextron_bench.cluster import ray_cluster
 
@@ -69,7 +100,7 @@ def check_cluster(cluster: str) -> None:
 
 @contextmanager
 def connected(address: str, runs: Path, threads: int) -> Iterator[RayCluster]:
-    """A connection to the cluster of the flag; says at the end on stderr how many pieces lost their node."""
+    """A connection to the cluster of a flag; says at the end on stderr how many pieces lost their node."""
     from dextron_bench.cluster.ray_cluster import RayCluster
 
     with RayCluster(address, runs, threads) as cluster:
@@ -78,37 +109,15 @@ def connected(address: str, runs: Path, threads: int) -> Iterator[RayCluster]:
         print_warning(f"pieces done again because their node was lost: {cluster.losses}")
 
 
-def play_jobs(jobs: Sequence[EvaluationJob], share: shares.Share, folder: Path, quiet: bool) -> int:
-    """Plays the pieces of a share of evaluations, and prints how many there are; returns the exit code."""
-    from dextron_bench.runs import annotations
+def play_on(cluster: RayCluster, works: Sequence[ListedWork], quiet: bool) -> None:
+    """Plays the pieces that works lack on a cluster."""
+    from dextron_bench.cluster import pieces
 
-    pieces = [(job, piece) for job in jobs for piece in job.pieces()]
-    mine = [pair for place, pair in enumerate(pieces) if share.has(place)]
-    done = {id(job): job.done() for job in jobs}
-    for job, piece in mine:
-        if piece.name not in done[id(job)]:
-            with (
-                annotations.noting_failure([job.folder]),
-                progress_bar(f"{job.folder.identity}, {piece.name}", quiet) as progress,
-            ):
-                job.play_piece(piece, progress)
-    return print_done(share, f"{len(mine)} of {len(pieces)} pieces", folder)
+    with progress_bar("pieces", quiet) as progress:
+        pieces.play(cluster, works, progress)
 
 
-def check_jobs(jobs: Iterable[EvaluationJob]) -> None:
-    """Raises MissingPieces if a piece of the evaluations is not done."""
-    names: list[str] = []
-    present: set[str] = set()
-    for job in jobs:
-        done = job.done()
-        named = {piece.name: f"{job.folder.identity}/{piece.name}" for piece in job.pieces()}
-        names += named.values()
-        present |= {text for name, text in named.items() if name in done}
-    shares.check_complete("the merge", names, present)
-
-
-def print_done(share: shares.Share, what: str, folder: Path) -> int:
-    """Prints that what a share does is done, and what to do then; returns the exit code."""
+def _print_done(share: object, what: str, folder: Path) -> None:
+    """Prints that what a share does is done, and what to do then."""
     print(f"share {share}: its {what} are done, in {folder}")
     print("when all shares are done, put their folders together, and run the same command with --merge")
-    return DONE

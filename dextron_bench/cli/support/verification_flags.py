@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import tyro
-
-from dextron_bench.cli.support import flags, pieces
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.output import progress_bar
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces
 from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
@@ -38,13 +37,13 @@ class SubmissionFlags:
         from dextron_bench.splits.fresh_settings import FreshSettings
         from dextron_bench.storage import hashing
         from dextron_bench.submissions import verification
+        from dextron_bench.submissions.seed_check import Playing
 
         drawn = {"submission": hashing.sha256(bundle), "rows": self.fresh_rows}
         fresh = FreshSettings(**drawn, beacon=self.beacon) if self.beacon else FreshSettings(**drawn)
         with progress_bar("verifying", self.quiet) as progress:
-            return verification.verify(
-                *opened, self.board, self.rerun, self.threads, trust=self.trust, fresh=fresh, report=progress
-            )
+            how = Playing(trust=self.trust, threads=self.threads, report=progress)
+            return verification.verify(*opened, self.board, how, self.rerun, fresh)
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,6 @@ class BoardFlags(SubmissionFlags):
     """With --all: also draw the fresh settings of every row again from its beacon; this takes minutes for each."""
     stamp: bool = False
     """With --all: give baselines that ran again completely the tier `re-run`, and build the leaderboard."""
-    pieces: Annotated[pieces.Pieces, tyro.conf.arg(name="")] = field(default_factory=pieces.Pieces)
+    pieces: Pieces = field(default_factory=PieceFlags)
     runs: Path = Path("runs")
     """Folder of all runs; the findings of shares are in its folder `verify`."""

@@ -54,7 +54,7 @@ class Sweep:
     """The name of the sweep; by default the method's name and a hash of what is asked."""
     show: bool = False
     """Run nothing: show this sweep, the one of --name, or a list of all."""
-    cluster: pieces.ClusterFlag = ""
+    cluster: pieces.Cluster = ""
     """Do the trials of a grid or a random search side by side on a cluster with Ray: on this machine, on the cluster it
     belongs to, or on another one."""
     into: flags.Picture = None
