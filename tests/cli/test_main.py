@@ -116,7 +116,7 @@ def test_a_search_prints_json(here: Path, monkeypatch: pytest.MonkeyPatch, capsy
         [("a", 0.0, 0.0, 0.0, 1.0, 0.5, 20.0, 90)], columns=[*tiny_benchmark.COLUMNS[1:7], "score", "length"]
     )
     monkeypatch.setattr(SearchWork, "run", lambda *_, **__: draws)
-    assert main.main(["mc", "--json", "--quiet"]) == 0
+    assert main.main(["data", "mc", "--json", "--quiet"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["kept"], summary["solved"]) == (1, 1)
 
