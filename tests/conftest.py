@@ -12,6 +12,7 @@ import pytest
 
 from dextron_bench.cli import main
 from dextron_bench.cli.support import output
+from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
 from tests.helpers import abilities, forged_bundles, tiny_benchmark, tiny_training
@@ -76,12 +77,14 @@ def release() -> Path:
 
 @pytest.fixture
 def opened(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Source]:
-    """Opens a source of reaches by name; `real` reads the authors' release, or skips."""
+    """Opens a source of reaches by name; `real` reads what is imported, else the authors' release, or skips."""
 
     def opened(reaches: str) -> Source:
-        if reaches == "real":
+        try:
+            return open_source(reaches)
+        except MissingData:
             monkeypatch.setenv("DEXTRON_DATA", str(request.getfixturevalue("release")))
-        return open_source(reaches)
+            return open_source(reaches)
 
     return opened
 
@@ -90,6 +93,22 @@ def opened(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> C
 def small_release(tmp_path: Path) -> SmallRelease:
     """A made-up release of three reaches."""
     return make_small_release(tmp_path)
+
+
+@pytest.fixture
+def rates(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Grows by the learning rate of each step of an optimiser Adam that is made from now on."""
+    import torch
+
+    used: list[float] = []
+
+    class Watched(torch.optim.Adam):
+        def step(self, closure: Any = None) -> Any:
+            used.append(self.param_groups[0]["lr"])
+            return super().step(closure)
+
+    monkeypatch.setattr(torch.optim, "Adam", Watched)
+    return used
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pandas as pd
 from msgspec.structs import replace
 
 from dextron_bench.evaluation.results import Result
-from dextron_bench.leaderboard.baseline_check import drawn_rows, play_rows
+from dextron_bench.leaderboard.baseline_check import agents_of, drawn_rows, play_rows
 from dextron_bench.reaches import sources
 from dextron_bench.splits.fresh_settings import FreshScores, FreshSettings, from_frame, to_frame
 from dextron_bench.splits.loading import Split
@@ -62,9 +62,9 @@ def play(
     run: RunFolder, result: Result, fresh: FreshSettings, splits: list[Split], threads: int, report: Progress
 ) -> None:
     """Plays fresh settings with the agent of a baseline's row, and writes the scores into its result."""
-    parts, total = [], sum(len(split) for split in splits)
+    new_agent, parts, total = agents_of(run, result), [], sum(len(split) for split in splits)
     for split in splits:
-        parts.append(play_rows(run, result, split, np.arange(len(split)), threads))
+        parts.append(play_rows(new_agent, split, np.arange(len(split)), threads))
         report(sum(map(len, parts)), total)
     atomic.write_json(run.result, replace(result, fresh=fresh.scores(pd.concat(parts))))
 
@@ -109,12 +109,13 @@ def _faults_of_baseline(
     run: RunFolder, result: Result, claimed: FreshScores, splits: list[Split], count: int, threads: int
 ) -> list[str]:
     """How the fresh scores of a baseline's row differ from the scores of its agent, run again."""
+    new_agent = agents_of(run, result)
     for split in splits:
         known = claimed.splits.get(split.name)
         if known is None or known.digest != split.digest or len(known.scores) != len(split):
             return [f"it has no scores for every fresh setting of {split.name}"]
         rows = drawn_rows(len(split), count)
-        if play_rows(run, result, split, rows, threads)["score"].tolist() != [known.scores[row] for row in rows]:
+        if play_rows(new_agent, split, rows, threads)["score"].tolist() != [known.scores[row] for row in rows]:
             return [f"its scores on fresh settings of {split.name} differ from its episodes, run again"]
     return []
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 
 import numpy as np
 import pandas as pd
@@ -92,10 +92,19 @@ def test_what_is_no_filter_is_one_line(text: str, reason: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["not " * 240 + "success", "return == " + "-" * 900 + "1"])
-def test_deep_nesting_is_read_or_refused(text: str) -> None:
-    with suppress(BadExpression):
-        assert matches(TABLE, text).tolist() == [False, True, False, True] or "-" in text
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("not " * 40 + "success", [1, 3]),
+        ("not " * 241 + "success", [0, 2]),
+        ("seed == " + "-" * 40 + "1", [1]),
+        ("seed == " + "-" * 900 + "1", [1]),
+    ],
+)
+def test_deep_nesting_is_read_or_refused(text: str, rows: list[int]) -> None:
+    """How deep Python itself can read depends on its version."""
+    with suppress(BadExpression) if len(text) > 500 else nullcontext():
+        assert np.flatnonzero(matches(TABLE, text)).tolist() == rows
 
 
 @settings(deadline=None)

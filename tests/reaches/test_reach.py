@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path as File
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -19,6 +19,8 @@ from dextron_bench.reaches.reach import (
     path,
     scaled_duration,
 )
+from dextron_bench.reaches.recorded.cache import load_reaches
+from dextron_bench.reaches.setting import Source
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -158,10 +160,9 @@ JUMPS = {"08_fr_16", "08_nr_04"}  # Recordings in which the tracker lost the han
 
 
 @pytest.mark.slow
-def test_every_recorded_reach_gives_a_valid_path_at_human_speed(release: File):
-    from dextron_bench.reaches.recorded.release import Manifest, read
-
-    reaches = read(release, Manifest.load())
+def test_every_recorded_reach_gives_a_valid_path_at_human_speed(opened: Callable[[str], Source]):
+    opened("real")
+    reaches = load_reaches()
     assert len(reaches) == 575
     fast = set()
     for reach in reaches:

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
 
+from dextron_bench.reaches.recorded import cache
+from dextron_bench.reaches.recorded.release import Manifest
+from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import SOURCES, RankedSource, SourceName, UnknownSource, open_source
+from tests.helpers.small_release import NAMES, SmallRelease
 
 
 def test_the_types_list_the_sources_in_their_order():
@@ -25,6 +31,18 @@ def test_the_types_import_nothing_heavy():
 @pytest.mark.parametrize("name", ["synthetic", "minjerk"])
 def test_a_source_has_the_name_that_opens_it(name: str):
     assert open_source(name).name == name
+
+
+def test_tests_read_the_real_reaches_that_are_imported(
+    small_release: SmallRelease, opened: Callable[[str], Source], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Without them, and without the authors' release, such a test is skipped."""
+    manifest = Manifest.load(small_release.manifest)
+    monkeypatch.setattr(Manifest, "load", lambda: manifest)
+    monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("DEXTRON_DATA", str(tmp_path / "missing"))
+    cache.import_release(small_release.zip())
+    assert opened("real").names == NAMES
 
 
 def test_an_unknown_name_lists_the_sources():

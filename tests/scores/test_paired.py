@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dextron_bench.scores import paired
+from dextron_bench.scores.statistics import Part
 
 RETURNS = st.integers(0, 20).map(float)
 ROWS = 6
@@ -27,6 +28,12 @@ def test_a_constant_lead_is_certain_even_if_settings_differ_much():
     a = np.array([[0.0, 5.0, 19.0, 3.0, 7.0, 7.0]])
     result = paired.difference(a, a + 1.0)
     assert (result.mean, result.low, result.high, result.detectable) == pytest.approx((1.0, 1.0, 1.0, 0.0), abs=1e-12)
+
+
+def test_the_seeds_of_two_methods_have_welchs_degrees_of_freedom():
+    """Variances 4 and 1 with 2 and 9 degrees of freedom: 5^2 / (4^2 / 2 + 1^2 / 9), between 2 and 11."""
+    (seeds,) = paired.pooled([Part(4.0, 2.0), Part(1.0, 9.0)])
+    assert (seeds.variance, seeds.freedom) == pytest.approx((5.0, 225.0 / 73.0))
 
 
 @pytest.mark.parametrize("settings", [1, 2, 5])

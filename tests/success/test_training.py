@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from dextron_bench.storage import folder_config, tensors
-from dextron_bench.success.generation import block_file
 from dextron_bench.success.training import MODEL, STATE, BadTrainingConfig, TrainingConfig, train
-from tests.success.test_dataset import write_block
+from tests.success.test_dataset import block_file, write_block
 from tests.success.test_generation import file_contents
 
 SHORT = TrainingConfig(epochs=2, updates=3, batch=8)
@@ -46,6 +45,14 @@ def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path,
     assert file_contents(tmp_path / "continued") == file_contents(trained)
     with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
         train(tmp_path / "continued", replace(SHORT, epochs=1))
+
+
+def test_the_learning_rate_is_halved_every_hundred_epochs(tmp_path: Path, rates: list[float]):
+    """Table II; here every two."""
+    assert TrainingConfig() == TrainingConfig(batch=1024, learning_rate=1e-3, halved_every=100)
+    write_block(tmp_path, 0, [30] * 10, [0, 1] * 5)
+    train(tmp_path, TrainingConfig(epochs=5, updates=1, batch=8, halved_every=2))
+    assert rates == [1e-3, 1e-3, 5e-4, 5e-4, 2.5e-4]
 
 
 def test_the_model_keeps_its_learning_curve_and_its_best_epoch(trained: Path):
