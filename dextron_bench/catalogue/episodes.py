@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -118,11 +118,10 @@ def runs_at(places: Sequence[Path]) -> list[RunFolder]:
     return list(runs)
 
 
-def run_identity(run: RunFolder) -> dict[str, Any]:
+def run_identity(run: RunFolder) -> dict[str, str | int]:
     """Method, source of reaches and seed of a run, as its recordings have them; raises DamagedFile."""
     if run.result.exists():
-        result = result_files.read_result(run.result)
-        return {"method": result.method, "reaches": result.reaches, "seed": result.seed}
+        return result_files.read_result(run.result).about
     config = records.read(run.config, RunConfig)
     if not config.reaches or config.seed is None:
         raise atomic.OtherForm(run.config, f"it lacks {'seed' if config.reaches else 'reaches'!r}")

@@ -78,6 +78,8 @@ class Figures:
                 yield self._file(name)
 
     def _success(self) -> Iterator[Path]:
+        from msgspec import structs
+
         from dextron_bench.methods import weights
         from dextron_bench.reaches.sources import open_source
         from dextron_bench.scores.figures import episodes as drawn_episodes
@@ -85,7 +87,8 @@ class Figures:
         from dextron_bench.splits.loading import load_split
         from dextron_bench.success import exemplars, network
 
-        success_curve(network.training_info(self.reaches)["curve"], self._file("fig4b"))
+        fit = network.training_info(self.reaches)
+        success_curve([structs.asdict(point) for point in fit.curve], self._file("fig4b"))
         yield self._file("fig4b")
         files = [file for file in weights.all_shipped(self.reaches) if file.stem == "seed0"]
         policies = {file.parts[-3]: weights.load_agent_from_file(file) for file in files}

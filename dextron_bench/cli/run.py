@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
@@ -157,17 +157,10 @@ class Run:
 
         rows = estimate(groups, self.runs, self.threads, self.device)
         if self.json:
-            print_json(rows)
+            print_json([asdict(row) for row in rows])
             return DONE
         cells = [
-            [
-                row["what"],
-                row["method"],
-                row["reaches"],
-                " ".join(map(str, row["seeds"])),
-                row["left"],
-                time_text(row["seconds"]),
-            ]
+            [row.what, row.method, row.reaches, " ".join(map(str, row.seeds)), row.left, time_text(row.seconds)]
             for row in rows
         ]
         print_table("left to do", ["what", "method", "reaches", "seeds", "left", "time"], cells)

@@ -91,7 +91,7 @@ class Windows:
 
         if name.endswith(weights.SUFFIX):
             file = Path(name)
-            return tensors.read_about(file).get("label", name), weights.load_agent_from_file(file)
+            return str(tensors.read_about(file).get("label", name)), weights.load_agent_from_file(file)
         return weights.agent_by_name(name, self.reaches)
 
 

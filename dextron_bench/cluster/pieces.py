@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.cluster import inputs
 from dextron_bench.cluster.ray_cluster import RayCluster
 from dextron_bench.cluster.tasks import OtherVersion, Task
 from dextron_bench.storage import block_work
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.block_work import BlockWork
 from dextron_bench.storage.pieces import CODE, ListedWork, Place, Recipe, Work
 from dextron_bench.storage.progress import Progress, no_progress
@@ -57,15 +58,15 @@ def play_blocks(cluster: RayCluster, work: BlockWork, progress: Progress = no_pr
 
 
 def play_piece(
-    runs: Path, threads: int, recipe: Recipe, folder: str, name: str, expected: Mapping[str, Any]
+    runs: Path, threads: int, recipe: Recipe, folder: str, name: str, expected: Mapping[str, Json]
 ) -> list[Path]:
     """Plays a piece on a node; returns its files. Raises OtherVersion if it depends on other things than expected."""
-    work = recipe.make(Place(runs, runs / folder, threads), **recipe.arguments)
+    work = recipe.make(Place(runs, runs / folder, threads))
     check_expected(work.title(name), _depends_on(work, name), expected)
     return work.play(name)
 
 
-def check_expected(what: str, here: Mapping[str, Any], expected: Mapping[str, Any]) -> None:
+def check_expected(what: str, here: Mapping[str, Json], expected: Mapping[str, Json]) -> None:
     """Raises OtherVersion if something depends on other things on this node than where the command runs."""
     if differing := [name for name in expected if here.get(name) != expected[name]]:
         raise OtherVersion(
@@ -76,15 +77,16 @@ def check_expected(what: str, here: Mapping[str, Any], expected: Mapping[str, An
 
 def _task(cluster: RayCluster, work: Work, name: str) -> Task:
     recipe = work.recipe(name)
-    arguments = {
-        "recipe": replace(recipe, files={}),
-        "folder": work.place.relative_to(cluster.runs).as_posix(),
-        "name": name,
-        "expected": _depends_on(work, name),
-    }
-    return Task(work.title(name), play_piece, arguments, inputs.of(recipe.reaches, recipe.files), cluster.threads)
+    play = partial(
+        play_piece,
+        recipe=replace(recipe, files={}),
+        folder=work.place.relative_to(cluster.runs).as_posix(),
+        name=name,
+        expected=_depends_on(work, name),
+    )
+    return Task(work.title(name), play, inputs.of(recipe.reaches, recipe.files), cluster.threads)
 
 
-def _depends_on(work: Work, name: str) -> dict[str, Any]:
+def _depends_on(work: Work, name: str) -> dict[str, Json]:
     """Everything that a piece depends on."""
     return {CODE: work.code, **(work.config_of(name) or {})}

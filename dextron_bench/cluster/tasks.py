@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.storage import atomic
 
@@ -29,14 +28,14 @@ class PieceFailed(RuntimeError):
         self.task = task
 
 
-# What a task calls on its node: perform(runs, threads, **arguments). It does the piece in the folder `runs` and returns
-# its files below that folder, in the order to write them in; what completes the piece is the last.
-Perform = Callable[..., Sequence[Path]]
+# What a task calls on its node: perform(runs, threads). It does the piece in the folder `runs` and returns its files
+# below that folder, in the order to write them in; what completes the piece is the last.
+Perform = Callable[[Path, int], Sequence[Path]]
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One piece. `perform` is a function of a module, so that every installation has it.
+    """One piece. `perform` is a function of a module with its other arguments, so that every installation has it.
 
     `inputs` are files by their place: `runs/...` below the node's folder of runs, `cache/...` below its folder for
     imported data. A task reserves `threads` processors and `gpus` GPUs.
@@ -44,7 +43,6 @@ class Task:
 
     name: str
     perform: Perform
-    arguments: Mapping[str, Any]
     inputs: Mapping[str, Path] = field(default_factory=dict)
     threads: int = 1
     gpus: int = 0

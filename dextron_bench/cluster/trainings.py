@@ -10,8 +10,8 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.cluster import inputs
 from dextron_bench.cluster.pieces import check_expected
@@ -20,6 +20,7 @@ from dextron_bench.cluster.tasks import BadCluster, Task
 from dextron_bench.methods import registry
 from dextron_bench.runs import plans
 from dextron_bench.storage import folder_config, provenance
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.training import loop
@@ -120,15 +121,16 @@ def _trainings(groups: Sequence[Sequence[plans.Run]], runs: Path, threads: int, 
 def _task(name: str, training: Training, runs: Path, threads: int) -> Task:
     plan, files = plans.without_file(training.run.plan)
     files |= {file.relative_to(runs).as_posix(): file for file in training.files()}
-    arguments: dict[str, Any] = {
-        "plan": plan,
-        "seeds": training.seeds,
-        "device": training.job.device,
-        "expected": _expected(training),
-        "seconds": SECONDS,
-    }
+    perform = partial(
+        train_some,
+        plan=plan,
+        seeds=training.seeds,
+        device=training.job.device,
+        expected=_expected(training),
+        seconds=SECONDS,
+    )
     gpus = int(training.job.device == "cuda")
-    return Task(name, train_some, arguments, inputs.of(training.job.reaches, files), threads, gpus)
+    return Task(name, perform, inputs.of(training.job.reaches, files), threads, gpus)
 
 
 def train_some(
@@ -137,7 +139,7 @@ def train_some(
     plan: plans.Plan,
     seeds: tuple[int, ...],
     device: str,
-    expected: Mapping[str, Any],
+    expected: Mapping[str, Json],
     seconds: float,
 ) -> Sequence[Path]:
     """Trains until the first new checkpoint after some seconds, or to the end; returns all files of the training.
@@ -160,7 +162,7 @@ def train_some(
     return training.files()
 
 
-def _expected(training: Training) -> dict[str, Any]:
+def _expected(training: Training) -> dict[str, Json]:
     """What a training depends on, besides the installation."""
     learner, setup = training.job.learner, replace(training.job, device="cpu").setup()
     code = provenance.code_hash(*registry.package_files(type(learner)))

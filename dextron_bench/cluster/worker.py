@@ -52,7 +52,7 @@ def _perform(task: Task, folder: Path, places: Mapping[str, str], contents: Sequ
         _copy(_stored(sha256, content), folder / place)
     _pin_threads(task.threads)
     with _data_folder(folder / CACHE):
-        files = task.perform(runs, task.threads, **task.arguments)
+        files = task.perform(runs, task.threads)
     for file in files:
         content, path = file.read_bytes(), file.relative_to(runs).as_posix()
         if (sha256 := content_hash(content)) != places.get(f"{RUNS}/{path}"):

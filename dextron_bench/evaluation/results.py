@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import pandas as pd
 from msgspec import UNSET, Meta, UnsetType, field
 
 from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.evaluation.episodes import action_hashes
+from dextron_bench.methods.settings import Settings
 from dextron_bench.splits.fresh_settings import FreshScores
 from dextron_bench.storage.provenance import Provenance
 from dextron_bench.storage.records import Amount, Count, Number, Record, Scores
@@ -60,7 +61,7 @@ class Maker(Record, frozen=True):
 
     method: str = ""
     code: Code | None = None
-    settings: dict[str, Any] | None = None
+    settings: Settings | None = None
 
 
 class RunConfig(Maker, frozen=True):
@@ -68,7 +69,7 @@ class RunConfig(Maker, frozen=True):
 
     reaches: str = ""
     seed: Count | None = None
-    defaults: dict[str, Any] = field(default_factory=dict)
+    defaults: Settings = field(default_factory=dict)
     physics: str = ""
 
 
@@ -98,6 +99,11 @@ class Result(Record, frozen=True):
     training: Training | None = None
     maker: Maker | None = None
     replay: Replay | None = None
+
+    @property
+    def about(self) -> dict[str, str | int]:
+        """Method, source of reaches and seed, as recordings say them."""
+        return {"method": self.method, "reaches": self.reaches, "seed": self.seed}
 
     @property
     def physics(self) -> str:

@@ -55,7 +55,7 @@ class SearchWork(BlockWork):
 
     def recipe(self, name: str) -> Recipe:
         """How another process makes the same search."""
-        return Recipe(open_work, {"search": self.search, "rows": self.goal}, self.search.reaches)
+        return Recipe(functools.partial(open_work, search=self.search, rows=self.goal), self.search.reaches)
 
     def amounts(self) -> dict[int, int]:
         """How many rows are solved in each block, also in pieces; raises DamagedBlock."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.leaderboard import collect, fresh_baselines, verify_board
 from dextron_bench.leaderboard.baseline_check import Finding
@@ -14,6 +14,7 @@ from dextron_bench.leaderboard.verify_board import Row
 from dextron_bench.methods import registry
 from dextron_bench.runs import result_files
 from dextron_bench.storage import atomic, hashing, provenance, records
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.pieces import ListedWork, Place, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
@@ -44,7 +45,7 @@ class RowChecks(ListedWork):
         """The run of a row: method, source of reaches and seed."""
         return self._rows()[name].run.identity
 
-    def config_of(self, name: str) -> dict[str, Any] | None:
+    def config_of(self, name: str) -> dict[str, Json] | None:
         """What a finding depends on: the published files of the row, the code of its method, and the flags."""
         if (row := self._rows().get(name)) is None:
             return None
@@ -62,8 +63,8 @@ class RowChecks(ListedWork):
         files = [file for file in visible(row.run.path.parent, "**/*") if file.suffix not in NOT_NEEDED]
         files += visible(self.board / fresh_baselines.FOLDER, f"{row.result.reaches}.*")
         inputs = {f"{BOARD}/{file.relative_to(self.board).as_posix()}": file for file in files if file.is_file()}
-        arguments = {"identity": row.run.identity, "count": self.count, "redraw": self.redraw}
-        return Recipe(_check_again, arguments, row.result.reaches, inputs)
+        again = partial(_check_again, identity=row.run.identity, count=self.count, redraw=self.redraw)
+        return Recipe(again, row.result.reaches, inputs)
 
     def play(self, name: str, report: Progress = no_progress) -> list[Path]:
         """Checks a row and writes what it finds; returns the files, the stamp last."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
@@ -15,7 +15,8 @@ from dextron_bench.methods import settings as method_settings
 from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.loading import UnknownMethod, installed_methods
-from dextron_bench.methods.settings import NAME, BadSettings, defaults_of, settings_of
+from dextron_bench.methods.settings import NAME, BadSettings, Settings, defaults_of, settings_of
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
@@ -28,7 +29,7 @@ __all__ = [
     "settings_of",
 ]  # Imported to be used as names of this module, too.
 
-PAPER_METHODS: tuple[tuple[str, dict[str, Any]], ...] = (  # The rows of figure 4a; `run --all` makes them.
+PAPER_METHODS: tuple[tuple[str, Settings], ...] = (  # The rows of figure 4a; `run --all` makes them.
     ("exp", {}),
     ("sim", {}),
     ("sor", {}),
@@ -75,7 +76,7 @@ def find_method(text: str) -> type[Entrant]:
     return _checked(text, loading.load_class(spec))
 
 
-def create(text: str, settings: Mapping[str, Any] | None = None, reaches: str = "") -> Entrant:
+def create(text: str, settings: Settings | None = None, reaches: str = "") -> Entrant:
     """The method with these settings and its defaults, for a source of reaches if one is given.
 
     Raises UnknownMethod, BadSettings if the method refuses the settings, AgentError if its code raises another error.
@@ -93,15 +94,15 @@ def create(text: str, settings: Mapping[str, Any] | None = None, reaches: str = 
     return method
 
 
-def paper_methods(preset: str) -> list[tuple[str, dict[str, Any]]]:
+def paper_methods(preset: str) -> list[tuple[str, Settings]]:
     """The methods of the paper's figure 4a with their settings; `preset` sets how long the learners train."""
     return [
-        (name, settings | ({"preset": preset} if hasattr(find_method(name), "preset") else {}))
+        (name, {**settings, **({"preset": preset} if hasattr(find_method(name), "preset") else {})})
         for name, settings in PAPER_METHODS
     ]
 
 
-def as_flags(text: str, settings: Mapping[str, Any]) -> str:
+def as_flags(text: str, settings: Settings) -> str:
     """The command-line flags of a method with settings; settings equal to their defaults are left out."""
     cls = method_settings.settings_class(find_method(text))
     defaults = {field.name: method_settings.default(field) for field in fields(cls)} if cls else {}
@@ -141,7 +142,7 @@ def describe(name: str) -> str:
         return str(error)
 
 
-def run_config(method: Entrant, reaches: str, seed: int) -> dict[str, Any]:
+def run_config(method: Entrant, reaches: str, seed: int) -> dict[str, Json]:
     """Everything that a method's run depends on: the content of its `config.json`."""
     return {
         "method": method.name,

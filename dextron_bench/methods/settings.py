@@ -7,11 +7,13 @@ import re
 import typing
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, Field, asdict, field, fields, is_dataclass, make_dataclass
-from typing import Any
+from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
 
 from dextron_bench.storage import hashing
+from dextron_bench.storage.atomic import Json
 
+Settings: TypeAlias = Mapping[str, Json]  # Values by the names of settings, a tuple where JSON has a list.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")  # A run's folder has the name of its method.
 PLAIN = (bool, int, float, str, tuple, type(None))  # Types of defaults; a parameter with another is no setting.
 LONGEST_VALUE = 24  # Characters of a setting's value in a label.
@@ -38,10 +40,10 @@ def settings_class(method: type, taken: Collection[str] = ()) -> type | None:
     return make_dataclass("Settings", made, frozen=True)
 
 
-_GIVEN: WeakKeyDictionary[Any, dict[str, Any]] = WeakKeyDictionary()  # Of objects whose class is no dataclass.
+_GIVEN: WeakKeyDictionary[Any, Settings] = WeakKeyDictionary()  # Of objects whose class is no dataclass.
 
 
-def remember(method: Any, given: Mapping[str, Any]) -> None:
+def remember(method: Any, given: Settings) -> None:
     """Notes the settings with which an object was made, for `settings_of`, if its class is no dataclass.
 
     Raises BadSettings for an object that cannot be noted.
@@ -57,7 +59,7 @@ def remember(method: Any, given: Mapping[str, Any]) -> None:
             raise BadSettings(f"method {method.name!r} can have settings only as a dataclass ({error})") from error
 
 
-def settings_of(method: Any) -> dict[str, Any]:
+def settings_of(method: Any) -> Settings:
     """A method's settings as plain values, by name; without the defaults if its class is no dataclass."""
     if is_dataclass(method) and not isinstance(method, type):
         return asdict(method)
@@ -67,7 +69,7 @@ def settings_of(method: Any) -> dict[str, Any]:
         return {}
 
 
-def defaults_of(method: Any) -> dict[str, Any]:
+def defaults_of(method: Any) -> Settings:
     """The defaults of a method whose class is no dataclass, which `settings_of` leaves out; a seed is no setting."""
     if is_dataclass(method):
         return {}

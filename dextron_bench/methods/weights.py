@@ -5,14 +5,15 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dextron_bench.methods import registry
 from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
+from dextron_bench.methods.settings import Settings
 from dextron_bench.storage import hashing, tensors
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
@@ -52,7 +53,7 @@ def all_shipped(reaches: str) -> list[Path]:
     return sorted(file for folder in folders for file in visible(folder, f"*/{reaches}/seed*.safetensors"))
 
 
-def metadata(file: Path, sha256: str = "") -> dict[str, Any]:
+def metadata(file: Path, sha256: str = "") -> dict[str, Json]:
     """The training that made a file's weights, and the SHA-256 of the file, which is computed if it is not given.
 
     Raises BadTensors, OSError.
@@ -107,20 +108,21 @@ def load_agent_from_file(file: Path) -> Agent:
     return load_agent(learner, file)
 
 
-def maker_of(file: Path) -> tuple[str, dict[str, Any]]:
+def maker_of(file: Path) -> tuple[str, Settings]:
     """The method and the settings that a file of weights names; raises BadWeights, BadTensors, OSError.
 
     The method must be installed: a file may come from a stranger, so its metadata never makes other code run.
     """
     header = tensors.read_about(file)
-    if "method" not in header or not isinstance(header.get("settings"), dict):
+    method, settings = header.get("method"), header.get("settings")
+    if not isinstance(method, str) or not isinstance(settings, dict):
         raise BadWeights(f"{file} does not say which method's weights it holds")
-    if header["method"] not in registry.installed_methods():
+    if method not in registry.installed_methods():
         raise BadWeights(
-            f"{file} says it holds weights of {header['method']!r}, which is not installed; a file of weights never "
+            f"{file} says it holds weights of {method!r}, which is not installed; a file of weights never "
             f"imports code: choose from {', '.join(registry.installed_methods())}, or register it (CONTRIBUTING.md)"
         )
-    return header["method"], header["settings"]
+    return method, settings
 
 
 def agent_by_name(name: str, reaches: str, seed: int = 0) -> tuple[str, Agent]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
@@ -25,15 +26,25 @@ TIMED = 32  # Episodes that are played to measure the time of one.
 SHORT = 5  # Epochs of a timing run at most; a longer one would take as long as the training.
 
 
-def estimate(
-    groups: Sequence[Sequence[Run]], runs: Path, threads: int = 0, device: str = "cpu"
-) -> list[dict[str, Any]]:
+@dataclass(frozen=True, slots=True)
+class WorkLeft:
+    """A training or an evaluation with work `left`, in words; `seconds` is an estimate, None if it is unknown."""
+
+    what: Literal["train", "evaluate"]
+    method: str
+    reaches: str
+    seeds: list[int]
+    left: str
+    seconds: float | None
+
+
+def estimate(groups: Sequence[Sequence[Run]], runs: Path, threads: int = 0, device: str = "cpu") -> list[WorkLeft]:
     """A row for each training and each evaluation with work left, in their order; writes no files of a run.
 
-    Runs of a group differ only in their seeds. `left` is in words. `seconds` is an estimate, for epochs from earlier
+    Runs of a group differ only in their seeds. `seconds` is estimated, for epochs from earlier
     epochs or a timing run, and for episodes from episodes that experts play. Raises the errors of `execution.train`.
     """
-    rows: dict[str, dict[str, Any]] = {}
+    rows: dict[str, WorkLeft] = {}
     for group in groups:
         for run in group:
             folder_config.check(run.folder(runs).path, run.config())
@@ -57,7 +68,7 @@ def seconds_per_episode(reaches: str, threads: int) -> float:
     return (time.perf_counter() - start) / len(rows)
 
 
-def _training(job: TrainingJob, seeds: tuple[int, ...], folder: Path) -> dict[str, Any]:
+def _training(job: TrainingJob, seeds: tuple[int, ...], folder: Path) -> WorkLeft:
     """The row of a training; its time is unknown before the first epoch if its timing run is long."""
     learner = job.learner
     progress = Checkpoints(folder, seeds).progress()
@@ -67,26 +78,14 @@ def _training(job: TrainingJob, seeds: tuple[int, ...], folder: Path) -> dict[st
         rows = min(POINT_ROWS, len(load_split(job.reaches, "val"))) * math.ceil(left / learner.period)
         seconds = left * loop.seconds_per_epoch(learner, job.setup(), seeds)
         seconds += rows * len(seeds) * seconds_per_episode(job.reaches, job.threads)
-    return {
-        "what": "train",
-        "method": learner.label,
-        "reaches": job.reaches,
-        "seeds": list(seeds),
-        "left": f"{left} of {learner.epochs} epochs",
-        "seconds": seconds,
-    }
+    return WorkLeft("train", learner.label, job.reaches, list(seeds), f"{left} of {learner.epochs} epochs", seconds)
 
 
-def _evaluation(group: Sequence[Run], episodes: int, threads: int) -> dict[str, Any]:
+def _evaluation(group: Sequence[Run], episodes: int, threads: int) -> WorkLeft:
     """The row of an evaluation."""
-    return {
-        "what": "evaluate",
-        "method": group[0].label,
-        "reaches": group[0].source,
-        "seeds": [run.seed for run in group],
-        "left": f"{episodes} episodes",
-        "seconds": episodes * seconds_per_episode(group[0].source, threads),
-    }
+    source, seeds = group[0].source, [run.seed for run in group]
+    seconds = episodes * seconds_per_episode(source, threads)
+    return WorkLeft("evaluate", group[0].label, source, seeds, f"{episodes} episodes", seconds)
 
 
 def _missing_episodes(run: Run, runs: Path) -> int:

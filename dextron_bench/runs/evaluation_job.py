@@ -8,18 +8,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 import pandas as pd
 from msgspec.structs import replace
 
 from dextron_bench.evaluation import episode_table
+from dextron_bench.evaluation.episode_table import Row
 from dextron_bench.evaluation.episodes import Episode
+from dextron_bench.evaluation.results import Result
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import annotations, recording_files, run_files
 from dextron_bench.runs.recorder import Recorder
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic, provenance, records, tables
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.pieces import ForeignPiece, ListedWork, Piece, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.provenance import Provenance
@@ -48,11 +51,10 @@ class EvaluationJob(ListedWork):
     """The episodes of a run on splits, in the folder `place`.
 
     `play_rows` plays rows of a split and yields (row, episode) as episodes end. The first `record` rows of each split
-    are recorded, with `about` among their properties. `facts` are what the result says of the run. `config` is what the
-    episodes depend on besides split and rows, and `code_hash` the hash of the code. `made` is how another process makes
-    the same evaluation. With `rows_are_independent`, any rows may be played together. With `one_platform`, pieces of
-    different platforms do not fit together. At most `threads` processes write recordings; 0 means one for each
-    processor.
+    are recorded. `facts` is the result of the run without its episodes. `config` is what the episodes depend on besides
+    split and rows, and `code_hash` the hash of the code. `made` is how another process makes the same evaluation. With
+    `rows_are_independent`, any rows may be played together. With `one_platform`, pieces of different platforms do not
+    fit together. At most `threads` processes write recordings; 0 means one for each processor.
     """
 
     place: Path
@@ -60,9 +62,8 @@ class EvaluationJob(ListedWork):
     splits: Sequence[Split]
     play_rows: Callable[[Split, range], Played]
     record: int
-    about: dict[str, Any]
-    facts: dict[str, Any]
-    config: Mapping[str, Any]
+    facts: Result
+    config: Mapping[str, Json]
     code_hash: str
     made: Recipe
     rows_are_independent: bool = False
@@ -91,7 +92,7 @@ class EvaluationJob(ListedWork):
         """A piece with the run that it belongs to."""
         return f"{self.folder.identity}/{name}"
 
-    def config_of(self, name: str) -> dict[str, Any] | None:
+    def config_of(self, name: str) -> dict[str, Json] | None:
         """What the files of a piece depend on; None if the evaluation has no such piece."""
         if (piece := self.pieces().get(name)) is None:
             return None
@@ -144,7 +145,7 @@ class EvaluationJob(ListedWork):
         stored = table[table["split"] == split.name] if len(table) else table
         return len(stored) == len(split) and not recording_files.any_missing(self.folder, stored, self.record)
 
-    def _rows_of_split(self, split: Split, pieces: dict[str, Piece], report: Progress) -> list[dict[str, Any]]:
+    def _rows_of_split(self, split: Split, pieces: dict[str, Piece], report: Progress) -> list[Row]:
         """The rows of all episodes of a split, in order: from its pieces, and played where there are none."""
         names = [part.name for part in self._pieces_of(split)]
         missing = [name for name in names if name not in pieces]
@@ -158,12 +159,12 @@ class EvaluationJob(ListedWork):
             pieces |= self.stored()
         return [row for name in names for row in self._rows_of_piece(name, pieces[name])]
 
-    def _rows_of_piece(self, name: str, piece: Piece) -> list[dict[str, Any]]:
+    def _rows_of_piece(self, name: str, piece: Piece) -> list[Row]:
         """The rows of a piece; adds its recordings to the manifest. Raises DamagedFile."""
         file = self.file(name, TABLE)
         table = tables.read_own(file, tables.EPISODES)
         self._add_to_manifest({place: sha256 for place, sha256 in piece.files.items() if place != file})
-        return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
+        return cast("list[Row]", table.to_dict("records"))
 
     def _recorded(self, rows: range) -> int:
         return sum(row < self.record for row in rows)
@@ -172,14 +173,14 @@ class EvaluationJob(ListedWork):
         if recordings:
             recording_files.add_to_manifest(self.folder, {file.name: sha256 for file, sha256 in recordings.items()})
 
-    def _play(self, split: Split, rows: range, report: Progress) -> tuple[list[dict[str, Any]], dict[Path, str]]:
+    def _play(self, split: Split, rows: range, report: Progress) -> tuple[list[Row], dict[Path, str]]:
         """Plays rows of a split; returns their rows of the table, in order, and the SHA-256 of their recordings."""
-        played: dict[int, dict[str, Any]] = {}
+        played: dict[int, Row] = {}
         with Recorder(self.source, self._recorded(rows), self.threads) as recorder:
             for row, episode in self.play_rows(split, rows):
                 played[row] = episode_table.row(split, row, episode)
                 if row < self.record and len(episode.actions):
-                    about = recording_files.properties(split, row, self.about, played[row]["cause"])
+                    about = recording_files.properties(split, row, self.facts.about, played[row]["cause"])
                     recorder.write(self.folder.recording(split.name, row), split.case(row), episode, about)
                 report(len(played), len(rows))
             recordings = recorder.hashes()
@@ -195,7 +196,7 @@ class EvaluationJob(ListedWork):
         if self.folder.episodes.exists() or self.folder.curve.exists():
             makers.append(records.read(self.folder.provenance, Provenance))
         if any(part.name not in pieces for split in left for part in self._pieces_of(split)):
-            makers.append(provenance.collect(self.config["physics"]))
+            makers.append(provenance.collect(str(self.config["physics"])))
         merged = provenance.merged(makers)
         if self.one_platform and merged.others:
             self._check_platform(merged)
@@ -212,7 +213,7 @@ class EvaluationJob(ListedWork):
             )
 
 
-def _with_split(table: pd.DataFrame, split: str, rows: list[dict[str, Any]]) -> pd.DataFrame:
+def _with_split(table: pd.DataFrame, split: str, rows: list[Row]) -> pd.DataFrame:
     """The table with other rows of a split, at its end."""
     others = [table[table["split"] != split]] if len(table) else []
     return pd.concat([*others, pd.DataFrame(rows)], ignore_index=True)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+
+from msgspec.structs import replace as replace_record
 
 from dextron_bench.evaluation.results import Training
 from dextron_bench.evaluation.rollout import rollout
@@ -97,16 +99,15 @@ def _prepare(run: Run, runs: Path, source: Source, splits: Sequence[Split], thre
         for place, episode in rollout(new_agent(), source, split.rows(rows), threads=threads):
             yield rows.start + place, episode
 
-    facts = run.about | (_training_facts(run, folder.weights, sha256) if sha256 else {})
-    facts |= {"privileged": "each setting's expert"} if isinstance(player, Privileged) else {}
+    training = _training(run, folder.weights, sha256) if sha256 else None
+    privileged = "each setting's expert" if isinstance(player, Privileged) else None
     return EvaluationJob(
         folder.path,
         source,
         splits,
         play,
         run.plan.record,
-        run.about,
-        facts,
+        replace_record(run.facts, training=training, privileged=privileged),
         config | {"weights": sha256},
         provenance.code_hash(*registry.package_files(type(run.method))),
         _recipe(run, file),
@@ -119,8 +120,8 @@ def _recipe(run: Run, file: Path | None) -> Recipe:
     """How another process makes the evaluation of a run, with a file of weights."""
     plan, files = plans.without_file(run.plan)
     files |= {f"{WEIGHTS}/{file.name}": file} if file else {}
-    arguments = {"plan": replace(plan, weights=Path(file.name) if file else None), "label": run.label}
-    return Recipe(_prepare_again, arguments, run.source, files)
+    plan = replace(plan, weights=Path(file.name) if file else None)
+    return Recipe(partial(_prepare_again, plan=plan, label=run.label), run.source, files)
 
 
 def _prepare_again(place: Place, plan: plans.Plan, label: str) -> EvaluationJob:
@@ -157,13 +158,13 @@ def weights_file(run: Run, runs: Path) -> Path | None:
     return run.plan.weights
 
 
-def _training_facts(run: Run, file: Path, sha256: str) -> dict[str, Any]:
+def _training(run: Run, file: Path, sha256: str) -> Training:
     """What a result says of the training: the facts in the file of weights, and the number of demonstrations."""
     facts = weights.metadata(file, sha256)
     if run.learner is not None and not run.plan.weights:
         count = getattr(run.learner, "demonstrations", lambda episodes: None)
-        facts |= {"demonstrations": count(len(load_split(run.training_source, "train")))}
+        facts["demonstrations"] = count(len(load_split(run.training_source, "train")))
     try:
-        return {"training": records.convert(facts, Training)}
+        return records.convert(facts, Training)
     except records.Mismatch as error:
         raise tensors.OtherTensors(file, error) from error

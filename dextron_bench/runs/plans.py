@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
-from dextron_bench.evaluation.results import Code, RunConfig
+from dextron_bench.evaluation.results import Code, Result, RunConfig
 from dextron_bench.methods import registry, specs
 from dextron_bench.methods import weights as method_weights
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.registry import Entrant
+from dextron_bench.methods.settings import Settings
 from dextron_bench.splits.loading import ranking_splits, splits_under
 from dextron_bench.storage import records
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.training.jobs import TrainingJob
 
@@ -33,7 +34,7 @@ class Plan:
     splits: tuple[str, ...] = ()
     seed: int = 0
     record: int = 0
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Settings = field(default_factory=dict)
     weights: Path | None = None
 
 
@@ -61,9 +62,9 @@ class Run:
         return self.plan.seed
 
     @property
-    def about(self) -> dict[str, Any]:
-        """Method, source of reaches and seed, as results and recordings say them."""
-        return {"method": self.label, "reaches": self.source, "seed": self.seed}
+    def facts(self) -> Result:
+        """What a result says of the run before its episodes are played: method, source of reaches and seed."""
+        return Result(self.label, self.source, self.seed, splits={})
 
     def with_seed(self, seed: int) -> Run:
         """The same run with another seed."""
@@ -77,7 +78,7 @@ class Run:
         """The run's folder."""
         return RunFolder.of(runs, self.label, self.source, self.seed)
 
-    def config(self) -> dict[str, Any]:
+    def config(self) -> dict[str, Json]:
         """What the run depends on; a folder belongs to one config."""
         return registry.run_config(self.method, self.source, self.seed)
 

@@ -55,7 +55,7 @@ class Recorder:
         if self._pool:
             self._pool.shutdown(cancel_futures=True)
 
-    def write(self, file: Path, case: Case, episode: Episode, properties: dict[str, Any]) -> None:
+    def write(self, file: Path, case: Case, episode: Episode, properties: recording_files.Properties) -> None:
         """Writes the recording of an episode, now or later, as `recording_files.write` does.
 
         Raises UnwritableRecording and LostProcess, also for earlier recordings.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -19,6 +19,8 @@ from dextron_bench.success import network
 from dextron_bench.success.predict import predict
 from dextron_bench.world import model
 
+Properties = Mapping[str, str | int | float | bool]  # Of a recording, `recording.Value` by name.
+
 
 def any_missing(folder: RunFolder, table: pd.DataFrame, record: int) -> bool:
     """True if the recording of one of the first `record` rows is missing.
@@ -30,7 +32,7 @@ def any_missing(folder: RunFolder, table: pd.DataFrame, record: int) -> bool:
     return not all(file.exists() for file in files)
 
 
-def record(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> None:
+def record(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: Properties) -> None:
     """Writes the recording of an episode, and its hash in the manifest; `about` is as in `properties`."""
     file = folder.recording(split.name, row)
     case = split.case(row)
@@ -39,12 +41,12 @@ def record(folder: RunFolder, source: Source, split: Split, row: int, episode: E
     add_to_manifest(folder, {file.name: sha256})
 
 
-def properties(split: Split, row: int, about: dict[str, Any], cause: str) -> dict[str, Any]:
+def properties(split: Split, row: int, about: Properties, cause: str) -> Properties:
     """The properties of the recording of a row; `about` names method, source of reaches and seed."""
     return {**about, "split": split.name, "split_digest": split.digest, "row": row, "cause": cause}
 
 
-def write(source: Source, file: Path, case: Case, episode: Episode, about: dict[str, Any]) -> str:
+def write(source: Source, file: Path, case: Case, episode: Episode, about: Properties) -> str:
     """Writes the recording of an episode of a case, with properties `about`; returns its SHA-256.
 
     It also has what the shipped success model predicts. Raises UnwritableRecording.

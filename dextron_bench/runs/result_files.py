@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 from msgspec.structs import replace
@@ -24,16 +23,16 @@ class UnknownResult(LookupError):
     """A name that no result has."""
 
 
-def write_result(folder: RunFolder, table: pd.DataFrame, about: dict[str, Any], seconds: float | None = None) -> None:
+def write_result(folder: RunFolder, table: pd.DataFrame, facts: Result, seconds: float | None = None) -> None:
     """Writes the result of a run: the score of every episode, how episodes end, and what made them; notes its end.
 
-    A result that does not change leaves the end as it was. `seconds` of training belong to the provenance, since they
-    differ each time.
+    `facts` is the result without these. A result that does not change leaves the end as it was. `seconds` of training
+    belong to the provenance, since they differ each time.
     """
     maker = records.read(folder.config, Maker)
     made_by = records.read(folder.provenance, Provenance)
     made_by = made_by if seconds is None else replace(made_by, seconds=seconds)
-    result = Result(**about, splits=scores_by_split(table), provenance=made_by, maker=maker)
+    result = replace(facts, splits=scores_by_split(table), provenance=made_by, maker=maker)
     before = folder.result.read_bytes() if folder.result.exists() else b""
     atomic.write_json(folder.result, result)
     if folder.result.read_bytes() != before:

@@ -6,10 +6,10 @@ import errno
 import json
 import os
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import msgspec
 
@@ -19,6 +19,10 @@ LACKING = {  # What a file system answers to a call that it does not have; a ful
     *(errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EBADF, errno.EROFS),
 }
 NO_LINKS = LACKING | {errno.EPERM, errno.EACCES, errno.EMLINK, errno.EXDEV}  # Of `os.link`, where files can be made.
+if TYPE_CHECKING:  # A value of a JSON file, or one that can be written into it.
+    Json: TypeAlias = bool | int | float | str | Sequence["Json"] | Mapping[str, "Json"] | None
+else:
+    Json = Any  # In a record; msgspec knows no type that contains itself, and parsed JSON has no other values.
 
 
 class DamagedFile(ValueError):
@@ -159,7 +163,7 @@ def json_text(value: Any, indent: int | None = None) -> str:
     return json.dumps(value, indent=indent, sort_keys=True, default=msgspec.to_builtins)
 
 
-def read_json(file: Path) -> dict[str, Any]:
+def read_json(file: Path) -> dict[str, Json]:
     """Reads a JSON object from a file; raises DamagedFile. `records.read` also checks its content."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"), parse_constant=_refuse)

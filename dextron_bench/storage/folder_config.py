@@ -7,9 +7,9 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.storage import atomic, provenance, records, run_times
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.run_folder import RunFolder
 
 TRIES, PAUSE = 10, 0.1  # Looks at an empty config, and seconds between them; then it is damaged.
@@ -20,12 +20,12 @@ class FolderMismatch(ValueError):
     """A folder that holds a different config from the given one."""
 
 
-def check(folder: Path, config: Mapping[str, Any]) -> None:
+def check(folder: Path, config: Mapping[str, Json]) -> None:
     """Raises FolderMismatch if a folder holds a run of another config, DamagedFile if its config cannot be read."""
     _check(RunFolder(folder).config, config, "run", RUN_ADVICE)
 
 
-def write_or_check(folder: Path, config: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> None:
+def write_or_check(folder: Path, config: Mapping[str, Json], defaults: Mapping[str, Json] | None = None) -> None:
     """Writes config, provenance and begin of a run if there is no config yet; raises the same errors as `check`.
 
     `config` contains the hash of the physics. `defaults` belong to a method whose config has only the settings that
@@ -37,13 +37,13 @@ def write_or_check(folder: Path, config: Mapping[str, Any], defaults: Mapping[st
     _check(run.config, config, "run", RUN_ADVICE)
     if is_new:
         run_times.note_begin(run)
-        atomic.write_json(run.provenance, provenance.collect(config["physics"]))
+        atomic.write_json(run.provenance, provenance.collect(str(config["physics"])))
     elif not run.provenance.exists() and not run.episodes.exists():  # The writer of the config was killed, or is slow.
         with suppress(FileExistsError):
-            atomic.create_json(run.provenance, provenance.collect(config["physics"]))
+            atomic.create_json(run.provenance, provenance.collect(str(config["physics"])))
 
 
-def write_or_check_file(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
+def write_or_check_file(file: Path, config: Mapping[str, Json], content: str, advice: str) -> None:
     """Writes a config to a file that does not exist yet; raises FolderMismatch if the file holds another config.
 
     The message says that the folder holds another `content`, such as "search", names the entries that differ, and ends
@@ -53,7 +53,7 @@ def write_or_check_file(file: Path, config: Mapping[str, Any], content: str, adv
     _check(file, config, content, advice)
 
 
-def _create(file: Path, config: Mapping[str, Any]) -> bool:
+def _create(file: Path, config: Mapping[str, Json]) -> bool:
     """Writes a config; False if there is one."""
     if not file.exists():
         with suppress(FileExistsError):
@@ -62,19 +62,19 @@ def _create(file: Path, config: Mapping[str, Any]) -> bool:
     return False
 
 
-def _check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
+def _check(file: Path, config: Mapping[str, Json], content: str, advice: str) -> None:
     if not file.exists():
         return
     for _ in range(TRIES):  # Where the file system has no links, the file is empty at first.
         if file.stat().st_size:
             break
         time.sleep(PAUSE)
-    stored, expected = records.read(file, dict[str, Any]), json.loads(atomic.json_text(config))
+    stored, expected = records.read(file, dict[str, Json]), json.loads(atomic.json_text(config))
     if names := list(differences(stored, expected)):
         raise FolderMismatch(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")
 
 
-def differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:
+def differences(stored: Mapping[str, Json], expected: Mapping[str, Json]) -> Iterator[str]:
     """Names of the entries of `expected` with another stored value; inner names of a mapping in brackets."""
     for name, value in expected.items():
         stored_value = stored.get(name)

@@ -13,11 +13,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from dextron_bench.storage import atomic, folder_config, hashing, provenance, records
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.provenance import Provenance
@@ -40,7 +40,7 @@ class Stamp(Record, frozen=True):
     """What the stamp of a piece says: what the piece depends on, and its files with their SHA-256."""
 
     name: str
-    depends_on: dict[str, Any] = msgspec.field(name="depends on")
+    depends_on: dict[str, Json] = msgspec.field(name="depends on")
     code: str
     files: dict[str, str]
     provenance: Provenance
@@ -66,14 +66,13 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """How another process makes a work again: `make(place, **arguments)`.
+    """How another process makes a work again: `make(place)`.
 
-    `make` is a function of a module, so that every installation has it. It needs imported data of the source `reaches`,
-    and `files`, by their path below the folder of all runs.
+    `make` is a function of a module with its other arguments, so that every installation has it. It needs imported data
+    of the source `reaches`, and `files`, by their path below the folder of all runs.
     """
 
-    make: Callable[..., Work]
-    arguments: Mapping[str, Any]
+    make: Callable[[Place], Work]
     reaches: str
     files: Mapping[str, Path] = field(default_factory=dict)
 
@@ -97,7 +96,7 @@ class Work(ABC):
         return name
 
     @abstractmethod
-    def config_of(self, name: str) -> Mapping[str, Any] | None:
+    def config_of(self, name: str) -> Mapping[str, Json] | None:
         """What the piece of a name depends on besides the code, with the hash of the physics; None if it is of other
         work."""
 
@@ -118,7 +117,7 @@ class Work(ABC):
         config = self.config_of(name)
         assert config is not None, name
         hashes = {file.relative_to(self.place).as_posix(): hashing.sha256(file) for file in files}
-        made_by = provenance.collect(config["physics"])
+        made_by = provenance.collect(str(config["physics"]))
         stamp = Stamp(name, _with_simulator(config), self.code, hashes, made_by)
         atomic.write_json(file := self.file(name, ".json"), stamp)
         return [*files, file]
@@ -177,6 +176,6 @@ class ListedWork(Work):
         return set(self.stored())
 
 
-def _with_simulator(config: Mapping[str, Any]) -> dict[str, Any]:
+def _with_simulator(config: Mapping[str, Json]) -> dict[str, Json]:
     """A config as JSON has it, with the version of MuJoCo, on which the bits of episodes depend."""
     return json.loads(atomic.json_text({**config, "mujoco": provenance.version_of("mujoco")}))

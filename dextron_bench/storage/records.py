@@ -99,7 +99,7 @@ def _fault(content: Any, kind: type, message: str) -> tuple[str, str]:
     return f"{'/'.join(steps)}{in_name}", why
 
 
-def _wrong_entry(content: Any, kind: type, part: dict[str, Any], message: str) -> str:
+def _wrong_entry(content: Any, kind: type, part: dict[str, atomic.Json], message: str) -> str:
     """The name of the entry of an object inside the content that causes a message; removes all other entries."""
     for name, value in list(part.items()):
         part.clear()

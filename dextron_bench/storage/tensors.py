@@ -16,6 +16,7 @@ import numpy as np
 from safetensors.numpy import load, save
 
 from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage.atomic import Json
 
 ABOUT = "about"  # The only key of a file's metadata: several keys would have no fixed order.
 DTYPES = {"F64": "<f8", "F32": "<f4", "I64": "<i8", "I32": "<i4", "U8": "u1"}
@@ -39,7 +40,7 @@ class OtherTensors(BadTensors):
         ValueError.__init__(self, f"{file} is of another version or for another purpose ({why})")
 
 
-def write(file: Path, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]) -> None:
+def write(file: Path, arrays: Mapping[str, np.ndarray], about: Mapping[str, Json]) -> None:
     """Writes a file atomically; equal arrays and equal metadata `about`, JSON values, give equal bytes."""
     sealed = {**about, SEAL: [_digest_of_about(about), digest(arrays)]}
     content = save(
@@ -83,17 +84,17 @@ def memory_mapped(file: Path) -> dict[str, np.ndarray]:
     length, header = _header(file)
     try:
         entries = {name: entry for name, entry in json.loads(header).items() if name != "__metadata__"}
-        return {name: _memory_map(file, LENGTH + length, entry) for name, entry in entries.items()}
+        return {name: _memory_map(file, LENGTH + length, **entry) for name, entry in entries.items()}
     except (ValueError, AttributeError, TypeError, KeyError, RecursionError) as error:
         raise BadTensors(file, error) from error
 
 
-def read_about(file: Path) -> dict[str, Any]:
+def read_about(file: Path) -> dict[str, Json]:
     """The metadata of a file, empty if it has none; raises BadTensors, OSError."""
     return _about_and_seal(file)[0]
 
 
-def _about_and_seal(file: Path) -> tuple[dict[str, Any], Any]:
+def _about_and_seal(file: Path) -> tuple[dict[str, Json], Any]:
     """The metadata of a file, and the digest of its arrays or None; raises BadTensors, OSError."""
     _, header = _header(file)
     try:
@@ -107,7 +108,7 @@ def _about_and_seal(file: Path) -> tuple[dict[str, Any], Any]:
     return about, of_arrays
 
 
-def _digest_of_about(about: Mapping[str, Any]) -> str:
+def _digest_of_about(about: Mapping[str, Json]) -> str:
     return hashing.digest(json.dumps(about, sort_keys=True).encode())
 
 
@@ -120,18 +121,17 @@ def _header(file: Path) -> tuple[int, bytes]:
         return length, content.read(length)
 
 
-def _memory_map(file: Path, start: int, entry: Mapping[str, Any]) -> np.ndarray:
+def _memory_map(file: Path, start: int, dtype: str, shape: list[int], data_offsets: list[int]) -> np.ndarray:
     """The array of a header's entry; `start` is the position of the data in the file [bytes]."""
-    dtype, shape = np.dtype(DTYPES[entry["dtype"]]), tuple(entry["shape"])
-    begin, end = entry["data_offsets"]
-    if end - begin != dtype.itemsize * int(np.prod(shape)):
-        raise ValueError(f"an array of shape {shape} has {end - begin} bytes")
+    kind, (begin, end) = np.dtype(DTYPES[dtype]), data_offsets
+    if end - begin != kind.itemsize * int(np.prod(shape)):
+        raise ValueError(f"an array of shape {tuple(shape)} has {end - begin} bytes")
     try:
-        return np.memmap(file, dtype, "r", start + begin, shape)
+        return np.memmap(file, kind, "r", start + begin, tuple(shape))
     except OSError as error:
         if error.errno not in NO_MAPS:
             raise
-    array = np.fromfile(file, dtype, int(np.prod(shape)), offset=start + begin).reshape(shape)
+    array = np.fromfile(file, kind, int(np.prod(shape)), offset=start + begin).reshape(shape)
     array.flags.writeable = False
     return array
 

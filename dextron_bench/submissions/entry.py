@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.methods import registry, specs
 from dextron_bench.methods.isolation.launch import Launch, prepare_launch
+from dextron_bench.methods.settings import Settings
 from dextron_bench.reaches.sources import RankedSource
 from dextron_bench.submissions import bundle, manifest, names
 from dextron_bench.submissions.manifest import Agent, AgentKind, Declared, Manifest
@@ -25,7 +25,7 @@ class BadSubmission(ValueError):
     """An entry that cannot be submitted; the message says what is wrong."""
 
 
-def whole_settings(spec: str, settings: dict[str, Any], reaches: str) -> dict[str, Any]:
+def whole_settings(spec: str, settings: Settings, reaches: str) -> Settings:
     """An agent's settings; an installed method also has its defaults for the source of reaches.
 
     Raises BadSettings.
@@ -43,7 +43,7 @@ class Entry:
     spec: str
     reaches: RankedSource
     seeds: tuple[int, ...]
-    settings: dict[str, Any] = field(default_factory=dict)
+    settings: Settings = field(default_factory=dict)
     weights: Path | None = None
     declared: Declaration = field(default_factory=Declaration)
     trust: bool = False  # A policy's file may start without a sandbox.

@@ -5,10 +5,12 @@ Entries that a record does not name are refused, and texts, lists and numbers ar
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, UnsetType, field
 
+from dextron_bench.methods.settings import Settings
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.records import Count, Number, Record, Scores
 
 FORMAT: Literal[1] = 1
@@ -33,7 +35,7 @@ class Agent(Strict, frozen=True):
 
     kind: AgentKind
     spec: Annotated[str, Meta(max_length=1000)]
-    settings: dict[str, Any]
+    settings: Settings
     weights: Text200
 
 
@@ -97,7 +99,7 @@ class ClaimedResult(Strict, frozen=True):
     splits: Annotated[dict[SplitName, _SplitScores], Meta(min_length=1)]
     provenance: _Provenance
     tier: Literal["self-reported", "replayed", "re-run"] | UnsetType = UNSET
-    declared: dict[str, Any] = field(default_factory=dict)
-    maker: dict[str, Any] = field(default_factory=dict)
-    training: dict[str, Any] = field(default_factory=dict)
+    declared: dict[str, Json] = field(default_factory=dict)
+    maker: dict[str, Json] = field(default_factory=dict)
+    training: dict[str, Json] = field(default_factory=dict)
     privileged: Text200 = ""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from msgspec import to_builtins
 
+from dextron_bench.evaluation.results import Result
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent, Limits
 from dextron_bench.methods.isolation.launch import Launch
@@ -65,17 +65,15 @@ def prepare_all(entry: Entry, runs: Path, record: int, limits: Limits, threads: 
 
         folder, config = RunFolder.of_seed(entry.folder(runs), seed), {**common, "seed": seed, "files": hashes}
         folder_config.write_or_check(folder.path, config)
-        about = {"method": entry.name, "reaches": entry.reaches, "seed": seed}
-        arguments = {"entry": entry.in_folder(Path()), "record": record, "limits": limits, "seed": seed}
-        made = Recipe(_prepare_again, arguments, entry.reaches, {f"{ENTRANT}/{name}": files[name] for name in files})
+        again = partial(_prepare_again, entry=entry.in_folder(Path()), record=record, limits=limits, seed=seed)
+        made = Recipe(again, entry.reaches, {f"{ENTRANT}/{name}": files[name] for name in files})
         return EvaluationJob(
             folder.path,
             source,
             splits,
             play,
             record,
-            about,
-            about,
+            Result(entry.name, entry.reaches, seed, splits={}),
             config,
             code,
             made,
@@ -93,9 +91,7 @@ def _prepare_again(place: Place, entry: Entry, record: int, limits: Limits, seed
     return next(job for job in jobs if job.folder.seed == seed)
 
 
-def play_shuffled(
-    launch: Launch, source: Source, split: Split, seed: int, limits: Limits, threads: int = 0
-) -> Iterator[tuple[int, Any]]:
+def play_shuffled(launch: Launch, source: Source, split: Split, seed: int, limits: Limits, threads: int = 0) -> Played:
     """Plays a split with an agent in a separate process, in the order of `row_order`; yields rows and episodes."""
     rows = row_order(split, seed)
     with IsolatedAgent(launch, seed, limits) as agent:

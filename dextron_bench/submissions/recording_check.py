@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,15 +17,15 @@ from dextron_bench.world import model
 class RecordingCheck:
     """The recordings of one seed; `problems` lists the faults of the recordings that were checked."""
 
-    def __init__(self, run: RunFolder, claims: Mapping[str, Any], tolerance: float, report: Progress) -> None:
+    def __init__(self, run: RunFolder, method: str, tolerance: float, report: Progress) -> None:
         """Reads the properties of the recordings of a run.
 
-        `claims` are method, source of reaches and seed. `tolerance` is the largest difference of a position [m, rad]
-        from the replayed episode; 0 accepts equal bits only.
+        The run is of a `method`. `tolerance` is the largest difference of a position [m, rad] from the replayed
+        episode; 0 accepts equal bits only.
         """
         self._run, self._tolerance = run, tolerance
-        self._claims = {name: claims[name] for name in ("method", "seed")}
-        self._summaries = dict(self._screened(claims["seed"], report))
+        self._claims = {"method": method, "seed": run.seed}
+        self._summaries = dict(self._screened(run.seed, report))
         self.problems: list[str] = []
 
     def check(self, split: str, row: int, episode: Episode, cause: str) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 
 from dextron_bench.evaluation import episode_table
+from dextron_bench.evaluation.episode_table import Row
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches.setting import Source
@@ -49,7 +50,8 @@ def replay_table(
 ) -> Replayed:
     """Plays all rows of a table again; they must be rows of the splits (see `episode_tables.faults`)."""
     rows, replayed = [], Replayed(pd.DataFrame())
-    for split, row, claimed, episode in _played(source, splits, table, threads):
+    for split, claimed, episode in _played(source, splits, table, threads):
+        row = claimed["row"]
         observe(split.name, row, episode)
         computed = episode_table.row(split, row, episode)
         rows.append(computed)
@@ -66,16 +68,16 @@ def replay_table(
 
 def _played(
     source: Source, splits: Sequence[Split], table: pd.DataFrame, threads: int
-) -> Iterator[tuple[Split, int, dict[str, Any], Episode]]:
-    """For each row: its split, its number, the claims of the table, and the episode of the replay."""
+) -> Iterator[tuple[Split, Row, Episode]]:
+    """For each row: its split, the row as the table claims it, and the episode of the replay."""
     for split in splits:
         rows = table[table["split"] == split.name].sort_values("row").to_dict("records")
         actions = [np.asarray(row["actions"], float) for row in rows]
         for place, episode in replay(source, split.rows(row["row"] for row in rows), actions, threads):
-            claimed = {str(name): value for name, value in rows[place].items()}
+            claimed = cast(Row, rows[place])
             if claimed["failure"] and episode.failure:  # The agent failed at the end of its actions.
                 episode = replace(episode, failure=claimed["failure"])
-            yield split, claimed["row"], claimed, episode
+            yield split, claimed, episode
 
 
 def _equal(computed: Any, claimed: Any) -> bool:
@@ -83,14 +85,14 @@ def _equal(computed: Any, claimed: Any) -> bool:
     return bool(computed == claimed or (computed != computed and claimed != claimed))
 
 
-def _alike(computed: dict[str, Any], claimed: dict[str, Any]) -> bool:
+def _alike(computed: Row, claimed: Row) -> bool:
     """True if two episodes end alike."""
     same = all(_equal(computed[name], claimed[name]) for name in ALIKE)
     distance = np.abs(np.asarray(computed["final"]) - np.asarray(claimed["final"], float)).max()
     return same and bool(distance <= TOLERANCE)
 
 
-def _difference(name: str, claimed: dict[str, Any], computed: dict[str, Any]) -> str:
+def _difference(name: str, claimed: Row, computed: Row) -> str:
     if name == "trace":
         return f"its {WORDS[name]} differs from the hash of its actions played again"
     return f"says {WORDS.get(name, name)} {claimed[name]}; played again it is {computed[name]}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 from msgspec import structs
@@ -62,7 +61,7 @@ class SeedCheck:
             return finding
         lenient = not same_platform(result.provenance)
         tolerance = replay_check.TOLERANCE if lenient else 0.0
-        recordings = RecordingCheck(self._run, self._claims(), tolerance, report)
+        recordings = RecordingCheck(self._run, self._manifest.name, tolerance, report)
         replayed = self._replay(table, recordings, threads, report)
         for problem in recordings.problems:
             finding.add(problem)
@@ -116,10 +115,6 @@ class SeedCheck:
         bundle.parse(self._run.result.read_bytes(), ClaimedResult, self._run.result)
         return table, result_files.read_result(self._run.result), records.read(self._run.provenance, Provenance)
 
-    def _claims(self) -> dict[str, Any]:
-        """Method, source of reaches and seed, as the manifest has them."""
-        return {"method": self._manifest.name, "reaches": self._manifest.reaches, "seed": self._seed}
-
     def _replay(
         self, table: pd.DataFrame, recordings: RecordingCheck, threads: int, report: Progress
     ) -> replay_check.Replayed:
@@ -139,7 +134,9 @@ class SeedCheck:
     def _result(self, replayed: replay_check.Replayed, made_by: Provenance) -> Result:
         """The result computed from the episodes as they were played again, and how many of them are equal."""
         return Result(
-            **self._claims(),
+            self._manifest.name,
+            self._manifest.reaches,
+            self._seed,
             splits=scores_by_split(replayed.rows),
             provenance=made_by,
             declared=Declaration(**structs.asdict(self._manifest.declared)),

@@ -11,7 +11,7 @@ import json
 import sys
 from itertools import chain, product
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -24,16 +24,25 @@ MAY_LACK = {"closing_lag"}  # Empty if the hand never closed.
 COLUMNS = {*FLAGS, *NUMBERS, *TEXTS, *COUNTS, *LISTS}
 
 
+class Limits(TypedDict):
+    """The `rows` of the table, its most `groups` of rows, and the most bytes of `text` in a column of a group.
+
+    Also the characters of the `longest` text, and the most numbers of each list in `lists`.
+    """
+
+    rows: int
+    groups: int
+    text: int
+    longest: int
+    lists: dict[str, int]
+
+
 class BadTable(ValueError):
     """A table that no run writes; the message does not name the file."""
 
 
-def read(file: Path, limits: dict[str, Any]) -> pa.Table:
-    """The table in a file, after checks of its columns and of its size; raises BadTable, OSError.
-
-    `limits` are `rows`, `groups` of rows, bytes of `text` in a column of a group, characters of the `longest` text, and
-    the most numbers of each list in `lists`.
-    """
+def read(file: Path, limits: Limits) -> pa.Table:
+    """The table in a file, after checks of its columns and of its size; raises BadTable, OSError."""
     try:
         parquet = pq.ParquetFile(file, read_dictionary=list(TEXTS))
         if parquet.metadata.num_rows != limits["rows"]:
@@ -49,7 +58,7 @@ def read(file: Path, limits: dict[str, Any]) -> pa.Table:
         raise BadTable(f"cannot be read as a table ({error})") from error
 
 
-def _read_bounded(parquet: pq.ParquetFile, limits: dict[str, Any]) -> pa.Table:
+def _read_bounded(parquet: pq.ParquetFile, limits: Limits) -> pa.Table:
     """The table; checks texts while a dictionary holds each of them once, however many rows repeat it."""
     for group, name in product(range(parquet.num_row_groups), TEXTS):
         for chunk in parquet.read_row_group(group, columns=[name], use_threads=False).column(name).chunks:
@@ -84,7 +93,7 @@ def _check_columns(schema: pa.Schema) -> None:
             raise BadTable(f"has {schema.field(name).type} in column {name!r}")
 
 
-def _check_size(metadata: pq.FileMetaData, limits: dict[str, Any]) -> None:
+def _check_size(metadata: pq.FileMetaData, limits: Limits) -> None:
     """Raises BadTable for lists and texts that would fill the memory, by the sizes that the file states."""
     if metadata.num_row_groups > limits["groups"]:
         raise BadTable(f"has {metadata.num_row_groups} row groups, more than {limits['groups']}")

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dextron_bench.storage import records, tensors
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
 
@@ -114,7 +114,7 @@ def open_block(file: Path) -> dict[str, np.ndarray]:
 class DatasetConfig(records.Record, frozen=True):
     """What a data set was made with, and the hash of its physics."""
 
-    search: dict[str, Any]
+    search: dict[str, Json]
     physics: str
 
 

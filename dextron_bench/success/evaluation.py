@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from dextron_bench.experts.policies import Expert, ExpertAgent
 from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.rows import Rows
+from dextron_bench.storage.atomic import Json
 from dextron_bench.success import metrics
 from dextron_bench.success.metrics import Metrics
 from dextron_bench.success.network import SuccessModel
@@ -31,12 +32,14 @@ class Evaluation:
     auc_by_time: np.ndarray
     calibration: tuple[np.ndarray, np.ndarray, np.ndarray]
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Json]:
         """All values by name, for JSON: None replaces NaN."""
         means, shares, counts = (_without_nan(values) for values in self.calibration)
-        overall = {name: None if value != value else value for name, value in asdict(self.overall).items()}
+        overall: dict[str, Json] = {
+            name: None if math.isnan(value) else value for name, value in asdict(self.overall).items()
+        }
         curves = {"auc_by_time": _without_nan(self.auc_by_time), "predicted": means, "observed": shares}
-        return overall | curves | {"predictions": counts}
+        return {**overall, **curves, "predictions": counts}
 
 
 def with_random_experts(rows: Rows, seed: int = 0) -> Rows:
@@ -60,7 +63,7 @@ def evaluate(
 
 
 def _without_nan(values: np.ndarray) -> list[float | None]:
-    return [None if value != value else value for value in values.tolist()]
+    return [None if math.isnan(value) else value for value in values.tolist()]
 
 
 def _play(source: Source, rows: Rows, agent: Agent | None, threads: int) -> Iterator[Episode]:

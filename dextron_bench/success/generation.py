@@ -12,7 +12,6 @@ import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,8 @@ from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.splits.loading import load_split
 from dextron_bench.splits.rows import Rows
-from dextron_bench.storage import atomic, block_work, folder_config, tensors
+from dextron_bench.storage import atomic, block_work, folder_config, records, tensors
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.block_work import BlockWork
 from dextron_bench.storage.pieces import Place, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
@@ -143,18 +143,20 @@ class Generation(BlockWork):
         advice = "choose another folder, or remove it"
         folder_config.write_or_check_file(self.place / dataset.CONFIG, self.config_of(""), "data set", advice)
 
-    def config_of(self, name: str) -> dict[str, Any]:
+    def config_of(self, name: str) -> dict[str, Json]:
         """What a block depends on, besides its number."""
         return {"search": asdict(self.config), "physics": model.mjcf_hash()}
 
     def recipe(self, name: str) -> Recipe:
         """How another process makes the same data set."""
         files = {f"{POLICIES}/{policy}": file for policy, file in self.policies.items()}
-        return Recipe(open_generation, {"config": self.config, "rows": self.goal}, self.config.reaches, files)
+        return Recipe(
+            functools.partial(open_generation, config=self.config, rows=self.goal), self.config.reaches, files
+        )
 
     def amounts(self) -> dict[int, int]:
         """How many transitions each block has, also in pieces."""
-        return {number: int(tensors.read_about(file)["rows"]) for number, file in self.block_files().items()}
+        return {number: records.read_about(file, Tally).rows for number, file in self.block_files().items()}
 
     def play_blocks(self, numbers: Iterable[int]) -> Iterator[list[Path]]:
         """Plays blocks as pieces; yields the files of each, the stamp last."""

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import as_file, files
 from importlib.resources.abc import Traversable
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from dextron_bench.methods.exact import Perceptron, rounded
-from dextron_bench.storage import hashing, tensors
+from dextron_bench.storage import hashing, records, tensors
+from dextron_bench.storage.records import Count, Number, Record
 from dextron_bench.world import model
 
 HIDDEN = 256
@@ -79,6 +81,44 @@ def _check(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[int, ...
         raise BadModel(f"these arrays are not a success model: they also hold {extra[0]!r}; take a model.safetensors")
 
 
+class FitPoint(Record, frozen=True):
+    """Loss and accuracy after an epoch, on learned and on held-out settings."""
+
+    epoch: Count
+    loss: Number
+    accuracy: Number
+    test_loss: Number
+    test_accuracy: Number
+
+
+class Fit(Record, frozen=True):
+    """What the file of a model says of its training: its settings, rows of data, and learning curve."""
+
+    fit: dict[str, int | float]
+    rows: Count
+    epoch: Count
+    curve: Annotated[list[FitPoint], Meta(min_length=1)]
+    best_epoch: Count
+
+
+class Search(Record, frozen=True):
+    """The source of reaches of a data set, empty if it is not known."""
+
+    reaches: str = ""
+
+
+class Data(Record, frozen=True):
+    """The search that made a data set."""
+
+    search: Search = Search()
+
+
+class ModelOrigin(Record, frozen=True):
+    """The data set that the file of a model names."""
+
+    data: Data = Data()
+
+
 @cache
 def shipped_model(reaches: str) -> SuccessModel:
     """The success model that ships for a source of reaches; raises MissingModel."""
@@ -86,10 +126,10 @@ def shipped_model(reaches: str) -> SuccessModel:
         return SuccessModel(tensors.read(file))
 
 
-def training_info(reaches: str) -> dict[str, Any]:
-    """How the model that ships was trained: its `fit`, `rows`, `curve` and more; raises MissingModel."""
+def training_info(reaches: str) -> Fit:
+    """How the model that ships was trained; raises MissingModel."""
     with as_file(_model_file(reaches)) as file:
-        return tensors.read_about(file)
+        return records.read_about(file, Fit)
 
 
 def model_digest(reaches: str) -> str:

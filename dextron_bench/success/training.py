@@ -7,19 +7,18 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
 
 import numpy as np
 import torch
-from msgspec import Meta, to_builtins
+from msgspec import to_builtins
 from torch import Tensor, nn
 
 from dextron_bench.storage import records, tensors
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.progress import Progress, no_progress
-from dextron_bench.storage.records import Count, Number, Record
 from dextron_bench.success.dataset import Dataset, read_config
-from dextron_bench.success.network import CLIP, SIZES, SuccessModel
+from dextron_bench.success.network import CLIP, SIZES, Fit, FitPoint, SuccessModel
 
 STATE = "fit.safetensors"  # In the folder of a data set: all that an unfinished training needs to continue.
 MODEL = "model.safetensors"  # In the same folder: the trained model.
@@ -88,26 +87,6 @@ def initial_network(rng: np.random.Generator) -> nn.Sequential:
     return network
 
 
-class FitPoint(Record, frozen=True):
-    """Loss and accuracy after an epoch, on learned and on held-out settings."""
-
-    epoch: Count
-    loss: Number
-    accuracy: Number
-    test_loss: Number
-    test_accuracy: Number
-
-
-class Fit(Record, frozen=True):
-    """What the file of an unfinished training says of it: its settings, rows of data, and learning curve."""
-
-    fit: dict[str, Any]
-    rows: Count
-    epoch: Count
-    curve: Annotated[list[FitPoint], Meta(min_length=1)]
-    best_epoch: Count
-
-
 class _TrainingRun:
     """State of a training between two epochs."""
 
@@ -166,7 +145,7 @@ class _TrainingRun:
         """A note on the progress: the last accuracy on held-out settings."""
         return f"held-out accuracy {100 * self.curve[-1].test_accuracy:.1f} %" if self.curve else ""
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> dict[str, Json]:
         """How the model was trained, for the header of its file."""
         fit = Fit(asdict(self._config), len(self._data), self.epoch, self.curve, self.best_epoch)
         return to_builtins(fit) | {"data": to_builtins(read_config(self._folder)) or {}}

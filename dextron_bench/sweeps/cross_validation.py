@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from msgspec import field
@@ -23,6 +22,7 @@ from dextron_bench.splits import strata
 from dextron_bench.splits.loading import Split, load_split
 from dextron_bench.splits.rows import Rows
 from dextron_bench.storage import atomic, hashing, records
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.records import Count, Record, Scores
 from dextron_bench.storage.run_folder import RunFolder, runs_without
 from dextron_bench.sweeps.execution import Resources
@@ -47,7 +47,7 @@ class LeftOut:
 class LeftOutScores(Record, frozen=True):
     """The file of a seed: its scores on the settings of a subject, and what they depend on."""
 
-    depends_on: dict[str, Any] = field(name="depends on")
+    depends_on: dict[str, Json] = field(name="depends on")
     scores: Scores
     failed: Count
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dextron_bench.methods import registry
+from dextron_bench.methods.settings import Settings
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.runs import annotations, execution, result_files
 from dextron_bench.runs.plans import Run, beside_other_code, resolve
@@ -93,7 +93,7 @@ class _Attempt:
         self._sweep, self._earlier, self._resources, self._tag = sweep, earlier, resources, tag
         self._points: dict[int, float] = {}
 
-    def trial(self, settings: Mapping[str, Any], report: Progress) -> Trial:
+    def trial(self, settings: Settings, report: Progress) -> Trial:
         """The trial with its state and its scores; raises the errors that are not of a trial."""
         trial = Trial(settings, _run_name(self._sweep, settings, self._resources.runs))
         try:
@@ -151,7 +151,7 @@ class _Attempt:
             annotations.write(folder, replace(notes, tags=(*notes.tags, self._tag)))
 
 
-def _run_name(sweep: Sweep, settings: Mapping[str, Any], runs: Path) -> str:
+def _run_name(sweep: Sweep, settings: Settings, runs: Path) -> str:
     """The name of a trial's run; empty if the method refuses the settings."""
     try:
         run = beside_other_code(resolve(sweep.plan(settings)), runs)

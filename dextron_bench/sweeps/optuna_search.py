@@ -11,18 +11,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dextron_bench.methods.settings import Settings
 from dextron_bench.sweeps.space import Choices, Range, Space
 from dextron_bench.sweeps.trial import DONE, STOPPED, Trial
 
 if TYPE_CHECKING:
     import optuna
+    from optuna.distributions import BaseDistribution
 
 
 class MissingOptuna(ImportError):
     """Optuna is not installed."""
 
 
-def propose(space: Space, sampler: str, seed: Sequence[int], earlier: Sequence[Trial]) -> dict[str, Any]:
+def propose(space: Space, sampler: str, seed: Sequence[int], earlier: Sequence[Trial]) -> Settings:
     """The settings of the next trial, by the sampler "tpe" or "gp"; raises MissingOptuna."""
     optuna = load()
     number = int(np.random.SeedSequence(seed).generate_state(1)[0])
@@ -74,10 +76,10 @@ def _study(space: Space, earlier: Sequence[Trial], sampler: Any = None) -> optun
     return study
 
 
-def _distributions(space: Space) -> dict[str, Any]:
+def _distributions(space: Space) -> dict[str, BaseDistribution]:
     """A space as Optuna has it; choices are numbers of values, since Optuna takes no values of other types."""
     optuna = load()
-    distributions: dict[str, Any] = {}
+    distributions: dict[str, BaseDistribution] = {}
     for name, part in space.items():
         if isinstance(part, Choices):
             distributions[name] = optuna.distributions.CategoricalDistribution(range(len(part.values)))

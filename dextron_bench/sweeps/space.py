@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
+from msgspec import UNSET, UnsetType
+
+from dextron_bench.methods.settings import Settings
+from dextron_bench.storage.atomic import Json
+from dextron_bench.storage.records import Record
 
 DIGITS = 4  # Of a number that is drawn from a range.
 
@@ -21,13 +25,13 @@ class BadSpace(ValueError):
 class Choices:
     """A list of values, each as likely as the others."""
 
-    values: tuple[Any, ...]
+    values: tuple[Json, ...]
 
-    def draw(self, rng: np.random.Generator) -> Any:
+    def draw(self, rng: np.random.Generator) -> Json:
         """One of the values."""
         return self.values[rng.integers(len(self.values))]
 
-    def index(self, stored: Any) -> int:
+    def index(self, stored: Json) -> int:
         """The place of the value that a JSON file holds, where a tuple is a list; raises BadSpace."""
         text = json.dumps(stored)
         for index, value in enumerate(self.values):
@@ -71,17 +75,17 @@ class Range:
 Space = Mapping[str, Choices | Range]  # By name of the setting.
 
 
-def grid(space: Mapping[str, Choices]) -> list[dict[str, Any]]:
+def grid(space: Mapping[str, Choices]) -> list[Settings]:
     """Every combination of values; the last setting changes fastest."""
     return [dict(zip(space, values, strict=True)) for values in product(*(part.values for part in space.values()))]
 
 
-def draw(space: Space, rng: np.random.Generator) -> dict[str, Any]:
+def draw(space: Space, rng: np.random.Generator) -> Settings:
     """A random value of each setting."""
     return {name: part.draw(rng) for name, part in space.items()}
 
 
-def restored(space: Space, stored: Mapping[str, Any]) -> dict[str, Any]:
+def restored(space: Space, stored: Settings) -> Settings:
     """The settings that a JSON file holds, with the types that they have in the space; raises BadSpace."""
     return {
         name: part.values[part.index(stored[name])] if isinstance(part, Choices) else stored[name]
@@ -89,6 +93,15 @@ def restored(space: Space, stored: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def as_json(space: Space) -> dict[str, Any]:
-    """A space as plain values."""
-    return {name: asdict(part) for name, part in space.items()}
+class Part(Record, frozen=True):
+    """A list of values, or a range, in the file of a sweep."""
+
+    high: float | int | UnsetType = UNSET
+    log: bool | UnsetType = UNSET
+    low: float | int | UnsetType = UNSET
+    values: Sequence[Json] | UnsetType = UNSET
+
+
+def as_records(space: Space) -> dict[str, Part]:
+    """A space as the file of a sweep holds it."""
+    return {name: Part(**asdict(part)) for name, part in space.items()}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import msgspec
 
+from dextron_bench.methods.settings import Settings
 from dextron_bench.scores.statistics import Estimate
 from dextron_bench.storage.records import Count, Record, Return
 
@@ -33,7 +33,7 @@ class TrialPoint(Record, frozen=True):
 class TrialRecord(Record, frozen=True):
     """A trial in the file of a sweep."""
 
-    settings: dict[str, Any]
+    settings: Settings
     run: str
     state: str
     error: str
@@ -50,7 +50,7 @@ class Trial:
     `error` the line of a trial that failed.
     """
 
-    settings: Mapping[str, Any]
+    settings: Settings
     run: str = ""
     state: str = STARTED
     returns: Estimate | None = None
@@ -68,7 +68,7 @@ class Trial:
         """The trial as the file of a sweep holds it."""
         points = [TrialPoint(epoch, value) for epoch, value in sorted(self.points.items())]
         scores = TrialScores(self.failed, self.returns, self.successes)
-        return TrialRecord(dict(self.settings), self.run, self.state, self.error, scores, points)
+        return TrialRecord(self.settings, self.run, self.state, self.error, scores, points)
 
     @classmethod
     def of(cls, record: TrialRecord) -> Trial:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.storage import tensors
+from dextron_bench.storage import records, tensors
 from dextron_bench.success import generation, training
+from dextron_bench.success.network import Fit
 
 
 @pytest.fixture
@@ -35,9 +36,8 @@ def test_a_data_set_with_policies_and_a_model_trained_on_it(here: Path, capsys: 
     assert rows["all"]["rows"] == sum(row["rows"] for kind, row in rows.items() if kind != "all") >= 1500
     assert main.main(["success", "train", "--epochs", "2", "--quiet"]) == 0
     assert "model.safetensors" in capsys.readouterr().out
-    assert [
-        point["epoch"] for point in tensors.read_about(here / "runs/success/synthetic/seed0" / training.MODEL)["curve"]
-    ] == [1, 2]
+    model = here / "runs/success/synthetic/seed0" / training.MODEL
+    assert [point.epoch for point in records.read_about(model, Fit).curve] == [1, 2]
     assert main.main(["success", "eval", "--split", "test", *words[:2], "--json"]) == 0
     experts, policy = json.loads(capsys.readouterr().out)
     assert (experts["split"], experts["player"], policy["player"]) == ("test", "experts", words[1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -117,7 +118,8 @@ def test_inputs_that_fill_the_object_store_are_kept_on_disk(here: Path, monkeypa
     for number, file in enumerate(inputs):
         file.write_bytes(bytes([number]) * 40_000_000)
     tasks = [
-        Task(f"size {k}", tiny_cluster.measure, {"place": "file"}, {"runs/file": file}) for k, file in enumerate(inputs)
+        Task(f"size {k}", partial(tiny_cluster.measure, place="file"), {"runs/file": file})
+        for k, file in enumerate(inputs)
     ]
     with tiny_cluster.started(here / "data", monkeypatch, memory=80 * 2**20), RayCluster("auto", here) as cluster:
         cluster.run_all(tasks)

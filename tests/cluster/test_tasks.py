@@ -6,6 +6,7 @@ import errno
 import os
 import pwd
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,7 @@ def own_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_inputs_arrive_once_and_only_new_files_come_back(tmp_path: Path):
     (tmp_path / "weights").write_text("ab")
     inputs = {"runs/in/weights": tmp_path / "weights", "cache/reaches": tmp_path / "weights"}
-    task = Task("a", double, {"name": "in/weights"}, inputs, threads=1)
+    task = Task("a", partial(double, name="in/weights"), inputs, threads=1)
     (file,) = performed(task).files
     text, count, cache = file.content.decode().split()
     assert (file.path, text, count, Path(cache).name) == ("out/doubled", "abab", "1", "cache")
@@ -63,24 +64,24 @@ def test_inputs_arrive_once_and_only_new_files_come_back(tmp_path: Path):
 
 
 def test_a_reused_process_has_the_threads_of_its_task():
-    counts = [performed(Task("a", threads_of_libraries, {}, threads=count)).files[0].content for count in (2, 1)]
+    counts = [performed(Task("a", threads_of_libraries, threads=count)).files[0].content for count in (2, 1)]
     assert counts == [b"2 2", b"1 1"]
 
 
 @pytest.mark.parametrize("name", ["code", "data", "mujoco", "Python"])
 def test_another_version_does_nothing(name: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(worker.pickle, "loads", lambda content: pytest.fail("unpickled a task of another version"))
-    reply = performed(Task("a", fail, {}), {**installation.version(), name: "other"})
+    reply = performed(Task("a", fail), {**installation.version(), name: "other"})
     assert reply.is_refusal
     assert f"differs in {name}; install the same on all nodes" in reply.error
 
 
 def test_an_error_of_the_work_comes_back_in_words():
-    reply = performed(Task("a", fail, {}))
+    reply = performed(Task("a", fail))
     assert "table is damaged (it is short); remove it and run again" in reply.error
     assert "DamagedFile" in reply.traceback
     assert not reply.is_refusal
-    other = performed(Task("a", double, {"name": "missing"}))
+    other = performed(Task("a", partial(double, name="missing")))
     assert other.error.startswith("FileNotFoundError: ")
 
 
@@ -110,7 +111,7 @@ def test_a_piece_of_a_lost_node_is_done_before_new_ones(tmp_path: Path):
     cluster = ImmediateCluster("local", tmp_path / "runs")
     cluster.losing = {"b": 2}
     counts: list[tuple[int, int]] = []
-    tasks = [Task(name, threads_of_libraries, {}) for name in "abcd"]
+    tasks = [Task(name, threads_of_libraries) for name in "abcd"]
     cluster.run_all(tasks, lambda done, total, note="": counts.append((done, total)))
     assert cluster.order == ["a", "b", "c", "b", "d", "b"]
     assert list(dict.fromkeys(counts)) == [(0, 4), (1, 4), (2, 4), (3, 4), (4, 4)]

@@ -19,7 +19,7 @@ def test_a_method_without_training_needs_no_job():
     run = resolve(Plan("nothing", "synthetic", seed=2))
     assert (run.label, run.source, run.seed, run.learner) == ("nothing", "synthetic", 2, None)
     assert run.training_job(Path("runs")) is None
-    assert run.about == {"method": "nothing", "reaches": "synthetic", "seed": 2}
+    assert run.facts.about == {"method": "nothing", "reaches": "synthetic", "seed": 2}
     assert run.folder(Path("runs")).path == Path("runs/nothing/synthetic/seed2")
 
 

@@ -17,7 +17,7 @@ from dextron_bench.methods.learners import Learner
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage import atomic, tensors
+from dextron_bench.training import learning_curve
 
 BOARD = Path(__file__).parents[2] / "leaderboard"
 RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))
@@ -64,8 +64,8 @@ def test_weights_that_ship_made_the_published_result(file: Path):
     result = result_files.read_result(BOARD / "results" / name(file) / "result.json")
     assert result.training is not None
     assert to_builtins(result.training).items() >= weights.metadata(file).items()
-    points = atomic.read_json(BOARD / "results" / name(file) / "curve.json")["points"]
-    assert result.training.best_epoch in [point["epoch"] for point in points]
+    points = learning_curve.read(BOARD / "results" / name(file) / "curve.json")
+    assert result.training.best_epoch in [point.epoch for point in points]
 
 
 @pytest.mark.parametrize(
@@ -77,8 +77,7 @@ def test_weights_that_ship_made_the_published_result(file: Path):
 )
 def test_weights_that_ship_reproduce_the_published_scores(file: Path, rows: int, opened: Callable[[str], Source]):
     """The episodes are equal bit for bit, so returns are equal; `dextron-bench eval` does the same for every row."""
-    about, reaches = tensors.read_about(file), file.parent.name
-    learner = registry.create(about["method"], about["settings"])
+    reaches, learner = file.parent.name, registry.create(*weights.maker_of(file))
     assert isinstance(learner, Learner)
     split = load_split(reaches, "test")
     agent, source = weights.load_agent(learner, file), opened(reaches)

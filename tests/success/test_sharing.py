@@ -67,7 +67,7 @@ def test_another_process_reads_the_weights_of_policies_from_its_folder_of_runs(
     work = generation.open_generation(here, SMALL, ROWS, {"nothing": tmp_path / "a.safetensors"})
     recipe = work.recipe("000000")
     assert recipe.files == {"policies/nothing": tmp_path / "a.safetensors"}
-    again = recipe.make(there, **recipe.arguments)
+    again = recipe.make(there)
     assert read == [tmp_path / "a.safetensors", tmp_path / "node" / "policies" / "nothing"]
     assert isinstance(again, generation.Generation)
     assert (again.config, again.goal, again.place) == (SMALL, ROWS, tmp_path / "node" / "data")

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dextron_bench.storage import folder_config, tensors
+from dextron_bench.storage import folder_config, records, tensors
+from dextron_bench.success.network import Fit
 from dextron_bench.success.training import MODEL, STATE, BadTrainingConfig, TrainingConfig, train
 from tests.success.test_dataset import block_file, write_block
 from tests.success.test_generation import file_contents
@@ -56,10 +57,10 @@ def test_the_learning_rate_is_halved_every_hundred_epochs(tmp_path: Path, rates:
 
 
 def test_the_model_keeps_its_learning_curve_and_its_best_epoch(trained: Path):
-    about = tensors.read_about(trained / MODEL)
-    assert [point["epoch"] for point in about["curve"]] == [1, 2]
-    losses = [point["test_loss"] for point in about["curve"]]
-    assert losses[about["best_epoch"] - 1] == min(losses)
+    fit = records.read_about(trained / MODEL, Fit)
+    assert [point.epoch for point in fit.curve] == [1, 2]
+    losses = [point.test_loss for point in fit.curve]
+    assert losses[fit.best_epoch - 1] == min(losses)
 
 
 def test_other_settings_impossible_settings_and_a_model_as_state_are_refused(trained: Path):
@@ -102,4 +103,4 @@ def test_training_learns_an_outcome_that_depends_on_the_state(tmp_path: Path):
     low, high = model.chance(probe, np.zeros(2))
     assert low < 0.05
     assert high > 0.95
-    assert tensors.read_about(tmp_path / MODEL)["curve"][0]["test_accuracy"] > 0.9
+    assert records.read_about(tmp_path / MODEL, Fit).curve[0].test_accuracy > 0.9

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -16,7 +16,10 @@ from dextron_bench.cli.support.rows import first
 from dextron_bench.cli.support.success_models import load_model
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
+
+    from dextron_bench.success.evaluation import Evaluation
+    from dextron_bench.success.metrics import Metrics
 
 
 EXPERTS = "experts"  # What the rows of experts are called; other rows are called after a file of weights.
@@ -55,53 +58,56 @@ class Eval:
 
         model, source = load_model(self.model, self.runs, self.reaches), open_source(self.reaches)
         players = {EXPERTS: None} | {str(policy): weights.load_agent_from_file(policy) for policy in self.policies}
-        rows = []
+        evaluated: list[tuple[str, str, Evaluation]] = []
         for name in self.split or ranking_splits(self.reaches):
             whole = first(load_split(self.reaches, name), self.rows)
             for player, agent in players.items():
                 played = whole if agent else evaluation.with_random_experts(whole)
                 result = evaluation.evaluate(model, source, played, agent, self.threads)
-                rows.append({"split": name, "player": player, **result.as_dict()})
+                evaluated.append((name, player, result))
+        rows = [{"split": name, "player": player, **result.as_dict()} for name, player, result in evaluated]
         if self.json:
             print_json(rows)
         elif self.markdown:
-            _print_markdown(rows)
+            _print_markdown(evaluated)
         else:
             columns = [column for column, value in rows[0].items() if not isinstance(value, list)]
             print_table("success model", columns, [[row[column] for column in columns] for row in rows])
         return DONE
 
 
-def _print_markdown(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Prints three tables: the scores, the AUC by time, and the calibration on the first split."""
+def _print_markdown(rows: Sequence[tuple[str, str, Evaluation]]) -> None:
+    """Prints what is evaluated, by split and player, in three tables.
+
+    They are the scores, the AUC by time, and the calibration on the first split.
+    """
     heads = ["success [%]", "accuracy [%]", "base-rate accuracy [%]", "Brier", "base-rate Brier", "calibration error"]
-    print_markdown(["split", "agent", "transitions", *heads, "AUC"], [[*_names(row), *_scores(row)] for row in rows])
+    scores = [[f"`{name}`", _agent(player), *_scores(result.overall)] for name, player, result in rows]
+    print_markdown(["split", "agent", "transitions", *heads, "AUC"], scores)
     print()
     tenths = [f"{10 * k}-{10 * k + 10}" for k in range(10)]
-    print_markdown(
-        ["split", "agent", *tenths, "after"], [[*_names(row), *_rounded(row["auc_by_time"])] for row in rows]
-    )
+    by_time = [[f"`{name}`", _agent(player), *_rounded(result.auc_by_time)] for name, player, result in rows]
+    print_markdown(["split", "agent", *tenths, "after"], by_time)
     print()
-    first = [row for row in rows if row["split"] == rows[0]["split"]]
+    first = [(player, result.calibration[1]) for name, player, result in rows if name == rows[0][0]]
     bins = [f"{k / 10:.1f}-{(k + 1) / 10:.1f}" for k in range(10)]
-    print_markdown(["agent", *bins], [[_names(row)[1], *_rounded(row["observed"])] for row in first])
+    print_markdown(["agent", *bins], [[_agent(player), *_rounded(observed)] for player, observed in first])
 
 
-def _names(row: Mapping[str, Any]) -> list[str]:
-    """The split and the agent of a row."""
+def _agent(player: str) -> str:
+    """The label of a player, which is a file of weights or EXPERTS."""
     from dextron_bench.storage import tensors
 
-    is_expert = row["player"] == EXPERTS
-    return [f"`{row['split']}`", EXPERTS if is_expert else tensors.read_about(Path(row["player"]))["label"]]
+    return EXPERTS if player == EXPERTS else str(tensors.read_about(Path(player))["label"])
 
 
-def _scores(row: Mapping[str, Any]) -> list[str]:
-    """The cells of a row's scores."""
-    shares = [100 * row[name] for name in ("base_rate", "accuracy", "base_accuracy")]
-    scores = [row[name] for name in ("brier", "base_brier", "calibration_error", "auc")]
-    return [f"{row['rows']:,}", *_rounded(shares, 1), *_rounded(scores, 3)]
+def _scores(overall: Metrics) -> list[str]:
+    """The cells of scores."""
+    shares = [100 * share for share in (overall.base_rate, overall.accuracy, overall.base_accuracy)]
+    scores = [overall.brier, overall.base_brier, overall.calibration_error, overall.auc]
+    return [f"{overall.rows:,}", *_rounded(shares, 1), *_rounded(scores, 3)]
 
 
-def _rounded(values: Iterable[float | None], digits: int = 2) -> list[str]:
-    """Cells of numbers; empty for None and NaN."""
-    return ["" if value is None or math.isnan(value) else f"{value:.{digits}f}" for value in values]
+def _rounded(values: Iterable[float], digits: int = 2) -> list[str]:
+    """Cells of numbers; empty for NaN."""
+    return ["" if math.isnan(value) else f"{value:.{digits}f}" for value in values]

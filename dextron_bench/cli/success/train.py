@@ -30,15 +30,17 @@ class Train:
     quiet: flags.Quiet = False
 
     def __call__(self) -> int:
-        from dextron_bench.storage import tensors
+        from msgspec import structs
+
+        from dextron_bench.storage import records
         from dextron_bench.success import training
+        from dextron_bench.success.network import Fit
 
         folder = folder_of(self.runs, self.reaches, self.data)
         with progress_bar("epochs", self.quiet) as progress:
             training.train(folder, training.TrainingConfig(epochs=self.epochs, seed=self.seed), progress)
-        training_info = tensors.read_about(folder / training.MODEL)
-        best = training_info["curve"][training_info["best_epoch"] - 1]
-        columns = ["epoch", "loss", "accuracy", "test_loss", "test_accuracy"]
-        print_table("the best epoch on held-out settings", columns, [[best[column] for column in columns]])
+        fit = records.read_about(folder / training.MODEL, Fit)
+        best = structs.asdict(fit.curve[fit.best_epoch - 1])
+        print_table("the best epoch on held-out settings", list(best), [list(best.values())])
         print(folder / training.MODEL)
         return DONE

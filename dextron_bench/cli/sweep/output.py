@@ -21,7 +21,7 @@ def in_words(trial: Trial) -> str:
 
 def print_trials(file: SweepFile, content: SweepContent, trials: list[Trial], runs: Path) -> None:
     """Prints the table of trials, the best first."""
-    names = list(content.question["space"])
+    names = list(content.question.space)
     ranked = sorted(trials, key=lambda trial: -trial.score if trial.returns else 1.0)
     rows = [
         [
@@ -30,7 +30,7 @@ def print_trials(file: SweepFile, content: SweepContent, trials: list[Trial], ru
         ]
         for trial in ranked
     ]
-    seeds = " ".join(map(str, content.question["seeds"]))
+    seeds = " ".join(map(str, content.question.seeds))
     columns = [*names, "run", "return on val [95 %]", "success %", "state"]
     print_table(f"{file.path}, seeds {seeds}", columns, rows)
 
@@ -45,7 +45,7 @@ def print_winner(content: SweepContent, trials: list[Trial], runs: Path) -> None
         return
     winner, question = trials[content.winner.trial], content.question
     words = [content.flags, *(registry.as_flag(name, value) for name, value in winner.settings.items())]
-    words += ["--reaches", question["reaches"], "--seed", *map(str, question["seeds"])]
+    words += ["--reaches", question.reaches, "--seed", *map(str, question.seeds)]
     words += [] if runs == Path("runs") else ["--runs", str(runs)]
     title = "best so far" if any(trial.state == STARTED for trial in trials) else "winner"
     print(f"{title}: {winner.run}, with {in_words(winner)}\n{content.choice}")
@@ -56,14 +56,14 @@ def draw(content: SweepContent, trials: list[Trial], file: Path) -> None:
     """Draws the scores of the trials that are done against the only setting that varies; raises OSError."""
     from dextron_bench.scores.figures import sweeps
 
-    question, (setting,) = content.question, content.question["space"]
+    question, (setting,) = content.question, content.question.space
     points = [
         sweeps.Point(float(trial.settings[setting]), trial.returns, trial.successes)
         for trial in trials
         if trial.returns and trial.successes
     ]
-    seeds = " ".join(map(str, question["seeds"]))
-    title = f"{question['method']} on val of {question['reaches']} reaches, seeds {seeds}"
+    seeds = " ".join(map(str, question.seeds))
+    title = f"{question.method} on val of {question.reaches} reaches, seeds {seeds}"
     file.parent.mkdir(parents=True, exist_ok=True)
     sweeps.scaling(points, setting, title, file)
 

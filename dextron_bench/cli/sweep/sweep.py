@@ -15,6 +15,7 @@ from dextron_bench.cli.support.output import print_json, print_table, progress_b
 from dextron_bench.cli.sweep.output import in_words
 
 if TYPE_CHECKING:
+    from dextron_bench.sweeps.space import Part
     from dextron_bench.sweeps.sweep import Sweep as Question
     from dextron_bench.sweeps.sweep import SweepFile
     from dextron_bench.sweeps.trial import Trial
@@ -78,7 +79,7 @@ class Sweep:
         pieces.check_cluster(self.cluster)
         question = self._question()
         file = SweepFile.of(self.runs, self.name or default_name(question))
-        self._check_picture(space.as_json(question.space))
+        self._check_picture(space.as_records(question.space))
         if not self.show:
             if self.cluster:
                 self._run_on_cluster(question, file)
@@ -137,7 +138,7 @@ class Sweep:
         content = file.read()
         trials = [Trial.of(trial) for trial in content.trials]
         if self.into is not None:
-            self._check_picture(content.question["space"])
+            self._check_picture(content.question.space)
             sweep_output.draw(content, trials, self.into)
         if self.json:
             print_json(to_builtins(content))
@@ -146,7 +147,7 @@ class Sweep:
             sweep_output.print_winner(content, trials, self.runs)
         return EPISODES_FAILED if any(trial.failed or trial.state == FAILED for trial in trials) else DONE
 
-    def _check_picture(self, space: Mapping[str, Any]) -> None:
+    def _check_picture(self, space: Mapping[str, Part]) -> None:
         """Raises UnknownFormat or BadSweep if the scores over this space cannot be drawn into the file."""
         if self.into is None:
             return
@@ -154,7 +155,7 @@ class Sweep:
         from dextron_bench.sweeps.sweep import BadSweep
 
         pictures.check_format(self.into)
-        values = [value for part in space.values() for value in part.get("values", ())]
+        values = [value for part in space.values() for value in (part.values or ())]
         if len(space) != 1 or not all(type(value) in (int, float) for value in values):
             raise BadSweep("--into draws the scores against one setting with numbers; vary one, as in near=0.04,0.06")
 
@@ -169,7 +170,7 @@ class Sweep:
             winner = content.winner
             score = Trial.of(content.trials[winner.trial]).score if winner else None
             ended = sum(trial.state in ENDED for trial in content.trials)
-            rows.append([file.name, content.question["method"], ended, winner.run if winner else "", score])
+            rows.append([file.name, content.question.method, ended, winner.run if winner else "", score])
         if self.json:
             names = ("sweep", "method", "ended", "winner", "return")
             print_json([dict(zip(names, row, strict=True)) for row in rows])
