@@ -20,12 +20,13 @@ A number stands in a Markdown file between two comments, `<!--=KEY-->` and `<!--
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import pandas as pd
+from msgspec import structs
 
 from dextron_bench.evaluation.results import Result
 from dextron_bench.experts import database
@@ -151,10 +152,11 @@ def _results(rows: pd.DataFrame, reaches: str) -> str:
     return _markdown(["method", "seeds", *(f"`{name}`" for name in splits)], lines)
 
 
-def _search(summary: Mapping[str, Any], name: str) -> str:
+def _search(summary: database.Summary, name: str) -> str:
+    counts = structs.asdict(summary)
     if name in ("kept_rate", "solved_rate"):
-        return f"{100 * summary[name.removesuffix('_rate')] / summary['draws']:.2f}"
-    return f"{summary[name]:,}"
+        return f"{100 * counts[name.removesuffix('_rate')] / summary.draws:.2f}"
+    return f"{counts[name]:,}"
 
 
 def _totals() -> str:
@@ -188,8 +190,8 @@ def _bands(by: str) -> str:
 
 
 def _rates(reaches: str, by: str) -> dict[str, str]:
-    statistics = database.load_shipped(reaches)[1]["statistics"]
-    return {row["value"]: f"{100 * row['solved_rate']:.2f}" for row in statistics if row["by"] == by}
+    statistics = database.load_shipped(reaches)[1].statistics
+    return {row.value: f"{100 * row.solved_rate:.2f}" for row in statistics if row.by == by}
 
 
 def _markdown(columns: Sequence[str], lines: Iterable[Sequence[str]]) -> str:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ FILE = Path(model.__file__).with_name("hand.json")
 FREE_POSITIONS, FREE_VELOCITIES = ("x", "y", "z", "qw", "qx", "qy", "qz"), ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
-def constants() -> dict[str, Any]:
+def constants() -> model.HandConstants:
     """The values of the functions of `world.model` that need no simulator, from the compiled model."""
     joints = [model.load().joint(f"{digit}_proximal") for digit in model.DIGITS]
     return {

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dextron_bench.evaluation.results import Code, Result, RunConfig
+from dextron_bench.methods.settings import Settings
 from dextron_bench.runs import annotations, playing, result_files
 from dextron_bench.storage import records, run_times
 from dextron_bench.storage.run_folder import RunFolder, run_folders
@@ -41,7 +41,7 @@ class Entry:
     reaches: str
     folder: Path
     seeds: tuple[int, ...]
-    settings: Mapping[str, Any]
+    settings: Settings
     code: Code | None
     physics: str
     state: str

@@ -96,7 +96,7 @@ class Run:
         from dextron_bench.runs.plans import Plan, beside_other_code, resolve, with_tracks
 
         settings = settings_dict(self.method_settings)
-        methods = registry.paper_methods(**settings) if self.all else [(self.method, settings)]
+        methods = registry.paper_methods(self.method_settings.preset) if self.all else [(self.method, settings)]
         plans = [Plan(spec, self.reaches, self.split, 0, self.record, flags) for spec, flags in methods]
         runs = [beside_other_code(resolve(plan), self.runs) for plan in plans]
         runs = [with_tracks(run, self.track) for run in runs]

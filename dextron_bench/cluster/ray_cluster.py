@@ -135,7 +135,7 @@ class RayCluster:
 
     def _connect(self) -> None:
         """Starts Ray on this machine, or connects to a cluster; raises BadCluster."""
-        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "CRITICAL"}
+        quiet = {"log_to_driver": False, "logging_level": "CRITICAL"}
         try:
             if self._address == LOCAL:
                 self._ray.init("local", include_dashboard=False, **quiet)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -19,6 +19,7 @@ from dextron_bench.methods.agents import Agent
 from dextron_bench.reaches.setting import Source
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic, provenance
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import model, task
 
@@ -51,7 +52,7 @@ class Player:
 
     name: str
     agent: Agent
-    about: dict[str, Any] = field(default_factory=dict)
+    about: Mapping[str, Json] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ class Export:
 
     def _play(
         self, storage: MinariStorage, source: Source, threads: int, progress: Progress
-    ) -> Iterator[tuple[int, dict[str, Any]]]:
+    ) -> Iterator[tuple[int, dict[str, Json]]]:
         """Plays and stores every episode; yields its number and its metadata."""
         rows = self.split.first(self.rows)
         with _without_size(storage):
@@ -101,7 +102,7 @@ class Export:
                         raise BadExport(f"{player.name} failed in row {row} of {self.split.name!r}: {episode.failure}")
                     number = place * len(rows) + row
                     storage.update_episodes([_buffer(number, episode)])
-                    yield number, {"player": player.name, "row": row} | _episode_metadata(episode)
+                    yield number, {"player": player.name, "row": row, **_episode_metadata(episode)}
                     progress(place * len(rows) + done, len(self.players) * len(rows))
 
     def _metadata(self) -> dict[str, Any]:
@@ -181,12 +182,12 @@ def _buffer(number: int, episode: Episode) -> EpisodeBuffer:
     return EpisodeBuffer(id=number, **arrays)
 
 
-def _episode_metadata(episode: Episode) -> dict[str, Any]:
+def _episode_metadata(episode: Episode) -> dict[str, Json]:
     """The metadata of an episode; the setting is enough to play it again."""
     return {"setting": asdict(episode.setting), "return": episode.score, "is_success": episode.success}
 
 
-def summary(folder: Path) -> dict[str, Any]:
+def summary(folder: Path) -> dict[str, float]:
     """Numbers of episodes, steps and solved episodes of a data set, and its size [MB]."""
     from minari import MinariDataset
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from dextron_bench.storage import folder_config, provenance, records, tables
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.provenance import Provenance
 from dextron_bench.world import model, task
 
@@ -43,7 +43,7 @@ class Tally:
     solved: int
 
 
-def write_or_check(search: dict[str, Any], folder: Path) -> None:
+def write_or_check(search: Mapping[str, Json], folder: Path) -> None:
     """Writes the search into a new folder; raises FolderMismatch if the folder holds another search."""
     config = {"search": search, "physics": model.mjcf_hash()}
     folder_config.write_or_check_file(folder / SEARCH, config, "search", "choose another folder, or remove it")

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import itertools
 import json
-from dataclasses import asdict
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from msgspec import to_builtins
 
 from dextron_bench.experts import blocks, montecarlo
 from dextron_bench.reaches import setting
-from dextron_bench.storage import atomic, hashing
+from dextron_bench.storage import atomic, hashing, records
+from dextron_bench.storage.provenance import Provenance
+from dextron_bench.storage.records import Count, Record, Share
 from dextron_bench.world import model, task
 
 BANDS = 9  # Equal bands of d_c in the statistics.
@@ -29,30 +28,55 @@ class DamagedDatabase(ValueError):
     """A database that cannot be read, or whose rows differ from its summary."""
 
 
+class Group(Record, frozen=True):
+    """Counts and rates of the draws with a value of what they are grouped `by`."""
+
+    by: str
+    value: str
+    draws: Count
+    kept: Count
+    solved: Count
+    kept_rate: Share
+    solved_rate: Share
+
+
+class Summary(Record, frozen=True):
+    """What the file beside a database says of it: its search, the hash of its rows, counts, statistics, its makers."""
+
+    search: montecarlo.Search
+    digest: str
+    draws: Count
+    settings: Count
+    kept: Count
+    solved: Count
+    statistics: list[Group]
+    provenance: Provenance = Provenance()
+
+
 def save(
     draws: pd.DataFrame, source: setting.Source, search: montecarlo.Search, folder: Path, name: str
-) -> tuple[Path, dict[str, Any]]:
+) -> tuple[Path, Summary]:
     """Writes the kept rows as `<name>.parquet` and a summary as `<name>.json`; returns the file and the summary."""
     kept = draws[draws["score"] > blocks.KEPT].reset_index(drop=True).astype({"length": int})
     file = folder / f"{name}.parquet"
     atomic.write_atomically(file, lambda part: kept.to_parquet(part, compression="zstd"))
-    about = {
-        "search": asdict(search),
-        "digest": rows_digest(kept),
-        "draws": len(draws),
-        "settings": len(draws) // search.experts,
-        "kept": len(kept),
-        "solved": int((kept["score"] == task.SUCCESS).sum()),
-        "statistics": statistics(draws, source).to_dict("records"),
-        "provenance": to_builtins(blocks.read_makers(folder)),
-    }
+    about = Summary(
+        search=search,
+        digest=rows_digest(kept),
+        draws=len(draws),
+        settings=len(draws) // search.experts,
+        kept=len(kept),
+        solved=int((kept["score"] == task.SUCCESS).sum()),
+        statistics=records.convert(statistics(draws, source).to_dict("records"), list[Group]),
+        provenance=blocks.read_makers(folder),
+    )
     atomic.write_json(file.with_suffix(".json"), about)
     return file, about
 
 
 def load(file: Path) -> pd.DataFrame:
     """The rows of a database, verified against its summary; raises DamagedDatabase, FileNotFoundError."""
-    expected = summary(file)["digest"]
+    expected = summary(file).digest
     try:
         rows = pd.read_parquet(file)
         actual = rows_digest(rows)
@@ -65,20 +89,21 @@ def load(file: Path) -> pd.DataFrame:
     return rows
 
 
-def summary(file: Path) -> dict[str, Any]:
+def summary(file: Path) -> Summary:
     """A database's search, counts, statistics and provenance; raises DamagedDatabase, FileNotFoundError."""
     try:
-        about = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
+        return records.convert(json.loads(file.with_suffix(".json").read_text(encoding="utf-8")), Summary)
+    except records.Mismatch as error:
+        raise DamagedDatabase(
+            f"summary of expert database {file} is incomplete ({error}); make it again with `data mc`"
+        ) from error
     except ValueError as error:
         raise DamagedDatabase(f"summary of expert database {file} is damaged ({error}); make it again") from error
-    if not isinstance(about, dict) or not {"digest", "search", "statistics"} <= set(about):
-        raise DamagedDatabase(f"summary of expert database {file} is incomplete; make it again with `data mc`")
-    return about
 
 
-def check_physics(summary: dict[str, Any]) -> None:
+def check_physics(summary: Summary) -> None:
     """Raises OtherPhysics if the search of a summary was played with other physics than this version's."""
-    physics = summary.get("provenance", {}).get("physics", "")
+    physics = summary.provenance.physics
     if physics != model.mjcf_hash():
         raise OtherPhysics(
             f"the database was searched with physics {physics[:8] or 'unknown'}, and this version has "
@@ -86,7 +111,7 @@ def check_physics(summary: dict[str, Any]) -> None:
         )
 
 
-def load_shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:
+def load_shipped(reaches: str) -> tuple[pd.DataFrame, Summary]:
     """The shipped database of a source of reaches, and its summary; raises FileNotFoundError if none ships."""
     with as_file(files("dextron_bench") / "data") as folder:
         file = folder / f"experts-{reaches}.parquet"

@@ -8,7 +8,6 @@ import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,6 +18,7 @@ from dextron_bench.experts.montecarlo import Search
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.storage import atomic, block_work, folder_config, hashing, provenance, tables
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.block_work import BlockWork
 from dextron_bench.storage.pieces import Place, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
@@ -49,7 +49,7 @@ class SearchWork(BlockWork):
         """Writes the search into a new folder; raises FolderMismatch if the folder holds another search."""
         blocks.write_or_check(asdict(self.search), self.place)
 
-    def config_of(self, name: str) -> dict[str, Any]:
+    def config_of(self, name: str) -> dict[str, Json]:
         """What a block depends on, besides its number."""
         return {"search": asdict(self.search), "physics": model.mjcf_hash()}
 

@@ -6,7 +6,7 @@ import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -52,7 +52,7 @@ def checked_setting(value: object) -> Setting:
     return value
 
 
-def plain(setting: Setting) -> dict[str, Any]:
+def plain(setting: Setting) -> dict[str, str | float]:
     """A setting as a dictionary of a text and Python floats, which `checked_setting` reads."""
     return {name: value if isinstance(value, str) else float(value) for name, value in asdict(setting).items()}
 

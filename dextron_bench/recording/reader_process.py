@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Any
 
 from rerun.chunk import RrdReader
 
 PROPERTIES = "/__properties/"
 LONGEST = 2**16  # Characters of a line; whoever reads all lines of many files keeps them in memory.
+Properties = dict[str, str | int | float | bool | None]
 TOO_LONG = f"its properties have more than {LONGEST} characters"
 
 
@@ -32,8 +32,8 @@ def main(extent: str = "") -> None:
         print(answer if len(answer) <= LONGEST else json.dumps({"limit": TOO_LONG}), flush=True)
 
 
-def _describe(file: str, has_footer: bool, whole: bool) -> dict[str, Any]:
-    reader, properties = RrdReader(file), {}
+def _describe(file: str, has_footer: bool, whole: bool) -> dict[str, list[str] | dict[str, Properties]]:
+    reader, properties = RrdReader(file), dict[str, Properties]()
     stream = (reader.store() if has_footer else reader).stream()
     for chunk in stream if whole else stream.filter(content=f"{PROPERTIES}**"):
         columns = chunk.to_record_batch()

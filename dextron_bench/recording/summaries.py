@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from dextron_bench.processes import limited_process
 from dextron_bench.reaches.setting import Setting
@@ -36,6 +36,15 @@ class Summary:
     size: int = 0
     properties: dict[str, Value] = field(default_factory=dict)
     damage: str = ""
+
+
+class Description(TypedDict, total=False):
+    """What the reader process prints for a file: its content, or why it cannot be read."""
+
+    applications: list[str]
+    properties: dict[str, dict[str, Value]]
+    error: str
+    limit: str
 
 
 def summarise(files: Iterable[Path], whole: bool = False, hashes: Mapping[Path, str] = {}) -> Iterator[Summary]:
@@ -88,7 +97,7 @@ def _verified(summary: Summary, sha256: str | None) -> Summary:
     return summary
 
 
-def _describe(files: Sequence[tuple[Path, RrdFormat]], whole: bool) -> Iterator[dict[str, Any]]:
+def _describe(files: Sequence[tuple[Path, RrdFormat]], whole: bool) -> Iterator[Description]:
     """What the reader process prints for each file. If a file ends the process, a new one continues with the next."""
     while files:
         names = "".join(json.dumps([str(file), form.has_footer]) + "\n" for file, form in files).encode()
@@ -105,13 +114,13 @@ def _describe(files: Sequence[tuple[Path, RrdFormat]], whole: bool) -> Iterator[
             files = files[1:]
 
 
-def _summary(file: Path, form: RrdFormat, description: dict[str, Any]) -> Summary:
+def _summary(file: Path, form: RrdFormat, description: Description) -> Summary:
     """The summary of a file from what the reader process printed."""
     if "limit" in description:  # Not proof of damage: the machine may lack memory, or be slow.
         return Summary(file, damage=f"cannot be read ({description['limit']})")
     if "error" in description:
         return Summary(file, damage=form.undecodable(description["error"].rpartition(f"{file}: ")[2]))
-    applications, groups = description["applications"], description["properties"]
+    applications, groups = description.get("applications", []), description.get("properties", {})
     others = [name for name in applications if name not in APPLICATIONS]
     if others or len(applications) != 1:
         content = ", ".join(others) or "several episodes"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 import pandas as pd
@@ -86,7 +86,7 @@ def _boards(results: Iterable[Result]) -> dict[tuple[str, str, str], Board]:
     return boards
 
 
-def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
+def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, str | float]]:
     """The rows of a board. Of a method's numbers, only its rank depends on the other methods."""
     reaches, split, digest = key
     lengths = {len(seed.known.scores) for seeds in board.values() for seed in seeds}

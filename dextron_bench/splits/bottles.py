@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from dextron_bench.experts import policies
 from dextron_bench.splits import tracks
-from dextron_bench.splits.loading import bottles_file, split_digest
+from dextron_bench.splits.loading import Catalogue, SplitEntry, bottles_file, entries
 from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.splits.scanning import Scanner, best_critical, success_window
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, records
 from dextron_bench.world import bottle, task
 from dextron_bench.world.bottles import model_bottle
 
@@ -25,7 +23,7 @@ TRIES = 6  # Bottles that are drawn for a row; a row that none of them solves ke
 COLUMNS = ["split", *SETTING, "gain", "critical", "window", *bottle.COLUMNS]
 
 
-def build(scanner: Scanner, splits: pd.DataFrame, folder: Path) -> dict[str, dict[str, Any]]:
+def build(scanner: Scanner, splits: pd.DataFrame, folder: Path) -> dict[str, SplitEntry]:
     """Draws, certifies and writes the rows of every track into `folder`; returns their entries in the catalogue.
 
     `splits` is the table of the source's splits.
@@ -35,14 +33,10 @@ def build(scanner: Scanner, splits: pd.DataFrame, folder: Path) -> dict[str, dic
     table = pd.concat(parts, ignore_index=True)
     reaches = scanner.source.name
     atomic.write_atomically(folder / bottles_file(reaches), lambda part: table.to_parquet(part))
-    entries = {
-        str(name): {"rows": len(rows), "digest": split_digest(rows)}
-        for name, rows in table.groupby("split", sort=False)
-    }
-    catalogue = folder / "splits.json"
-    known = json.loads(catalogue.read_text(encoding="utf-8"))
-    atomic.write_json(catalogue, known | {reaches: known[reaches] | entries})
-    return entries
+    added, catalogue = entries(table), folder / "splits.json"
+    known = records.read(catalogue, Catalogue)
+    atomic.write_json(catalogue, known | {reaches: known[reaches] | added})
+    return added
 
 
 def certified(scanner: Scanner, plain: pd.DataFrame, track: tracks.Track) -> pd.DataFrame:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from dextron_bench.experts import policies
+from dextron_bench.experts.database import Summary
 from dextron_bench.reaches import setting
 from dextron_bench.splits import hard
-from dextron_bench.splits.loading import EVALUATED, SPLIT_NAMES, split_digest
+from dextron_bench.splits.loading import EVALUATED, SPLIT_NAMES, Catalogue, SplitEntry, entries
 from dextron_bench.splits.near_equal import SETTING, without_near_equal
 from dextron_bench.splits.scanning import RANGE, Scanner, best_critical, success_window
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, records
 from dextron_bench.world import task
 
 COLUMNS = ["split", *SETTING, "gain", "critical", "window"]
@@ -97,11 +96,11 @@ def draw_open(source: setting.Source, parts: Iterable[pd.DataFrame], seed: int, 
 def build(
     scanner: Scanner,
     database: pd.DataFrame,
-    summary: Mapping[str, Any],
+    summary: Summary,
     folder: Path,
     seed: int = 0,
     sizes: Sizes | None = None,
-) -> tuple[dict[str, dict[str, Any]], float]:
+) -> tuple[dict[str, SplitEntry], float]:
     """Makes, scans and writes the splits of a source into `folder`.
 
     `database` holds the kept rows of a search, and `summary` its settings and statistics. The search is also the scan
@@ -110,7 +109,7 @@ def build(
     source, sizes = scanner.source, sizes or Sizes()
     rates = subject_rates(summary) if source.name == "real" else None
     parts = partition(source, database, seed, sizes, rates)
-    tried = summary["search"]["experts"]
+    tried = summary.search.experts
     distance = hard.best_distance(scanner, parts["val"])
     held_out = pd.concat([part for name, part in parts.items() if name != "train"])
     parts["hard"] = hard.draw(
@@ -129,20 +128,17 @@ def build(
     return write(source.name, pd.concat(tables, ignore_index=True), folder), distance
 
 
-def subject_rates(summary: Mapping[str, Any]) -> dict[str, float]:
+def subject_rates(summary: Summary) -> dict[str, float]:
     """The success rate of a search for each subject, from the summary of its database."""
-    return {row["value"]: row["solved_rate"] for row in summary["statistics"] if row["by"] == "subject"}
+    return {row.value: row.solved_rate for row in summary.statistics if row.by == "subject"}
 
 
-def write(reaches: str, table: pd.DataFrame, folder: Path) -> dict[str, dict[str, Any]]:
+def write(reaches: str, table: pd.DataFrame, folder: Path) -> dict[str, SplitEntry]:
     """Writes the splits of a source, one after the other in `table`; returns their entry in the folder's catalogue."""
     atomic.write_atomically(folder / f"splits-{reaches}.parquet", lambda part: table.to_parquet(part))
-    entry = {
-        str(name): {"rows": len(rows), "digest": split_digest(rows)}
-        for name, rows in table.groupby("split", sort=False)
-    }
+    entry = entries(table)
     catalogue = folder / "splits.json"
-    others = json.loads(catalogue.read_text(encoding="utf-8")) if catalogue.exists() else {}
+    others = records.read(catalogue, Catalogue) if catalogue.exists() else {}
     atomic.write_json(catalogue, others | {reaches: entry})
     return entry
 

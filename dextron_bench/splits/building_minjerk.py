@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,6 +18,7 @@ from dextron_bench.experts.policies import Expert
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import REACHES, MinjerkSource
 from dextron_bench.splits import building
+from dextron_bench.splits.loading import SplitEntry
 from dextron_bench.splits.scanning import Scanner
 from dextron_bench.world import task
 from dextron_bench.world.engine import Engine
@@ -37,7 +37,7 @@ class Sizes:
     batch: int = 256
 
 
-def build(folder: Path, engine: Engine, seed: int = 0, sizes: Sizes | None = None) -> dict[str, dict[str, Any]]:
+def build(folder: Path, engine: Engine, seed: int = 0, sizes: Sizes | None = None) -> dict[str, SplitEntry]:
     """Makes, scans and writes the splits of `minjerk` into `folder`; returns their entry in the catalogue.
 
     Raises TooFewRows if too few of the first REACHES reaches, or of the next REACHES reaches, are solved.

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import as_file, files
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,12 +17,23 @@ from dextron_bench.reaches import setting
 from dextron_bench.splits import tracks
 from dextron_bench.splits.rows import Rows, UnknownRow
 from dextron_bench.splits.tracks import PLAIN, Track
-from dextron_bench.storage import hashing
+from dextron_bench.storage import hashing, records
+from dextron_bench.storage.records import Count, Record
 from dextron_bench.world import bottle
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
 SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "hard", "open")
 EVALUATED = ("test", "unseen-reach", "unseen-subject", "hard")
+
+
+class SplitEntry(Record, frozen=True):
+    """What the catalogue says of a split: its number of rows and its hash."""
+
+    rows: Count
+    digest: str
+
+
+Catalogue = dict[str, dict[str, SplitEntry]]  # By source of reaches and name of the split.
 
 
 class UnknownSplit(KeyError):
@@ -125,7 +135,7 @@ def _rows(table: pd.DataFrame, reaches: str, name: str) -> tuple[pd.DataFrame, s
     """The rows of a split, and their hash; raises DamagedSplit if it is not the hash of the catalogue."""
     try:
         rows = table[table["split"] == name]
-        digest, expected = split_digest(rows), _catalogue()[reaches][name]["digest"]
+        digest, expected = split_digest(rows), _catalogue()[reaches][name].digest
     except (KeyError, ValueError, TypeError) as error:
         raise DamagedSplit(f"the splits of {reaches!r} reaches lack {error}; reinstall the package") from error
     if digest != expected:
@@ -154,10 +164,17 @@ def split_digest(rows: pd.DataFrame) -> str:
     return hashing.digest(names, *(np.ascontiguousarray(rows[c], "<f8").tobytes() for c in numbers))
 
 
+def entries(table: pd.DataFrame) -> dict[str, SplitEntry]:
+    """The entries of a table of splits in the catalogue, by the split's name."""
+    groups = table.groupby("split", sort=False)
+    return {str(name): SplitEntry(len(rows), split_digest(rows)) for name, rows in groups}
+
+
 @cache
-def _catalogue() -> dict[str, dict[str, Any]]:
+def _catalogue() -> Catalogue:
     try:
-        return json.loads(files("dextron_bench.data").joinpath("splits.json").read_text(encoding="utf-8"))
+        content = json.loads(files("dextron_bench.data").joinpath("splits.json").read_text(encoding="utf-8"))
+        return records.convert(content, Catalogue)
     except (FileNotFoundError, ValueError) as error:
         raise DamagedSplit(f"the catalogue of splits cannot be read ({error}); reinstall the package") from error
 

@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dextron_bench.storage import records
-from dextron_bench.storage.atomic import DamagedFile
+from dextron_bench.storage.atomic import DamagedFile, Json
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import SEED
 from dextron_bench.training import loop, metric_rows, timing
@@ -97,10 +96,10 @@ class TrainingFiles:
         """True if no process is training here."""
         return not self._checkpoints.is_locked
 
-    def config(self) -> dict[str, Any]:
+    def config(self) -> dict[str, Json]:
         """The config of the training; empty if there is none yet."""
         file = self.folder / "config.json"
-        return records.read(file, dict[str, Any]) if file.exists() else {}
+        return records.read(file, dict[str, Json]) if file.exists() else {}
 
     def points(self) -> list[Point]:
         """New values of epochs: metrics under `train/`, rates and memory. An epoch counts once, though it may return.

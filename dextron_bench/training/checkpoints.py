@@ -12,12 +12,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Trainer
 from dextron_bench.storage import atomic, hashing, locks, records, tensors
-from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder, OtherForm
+from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder, Json, OtherForm
 from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.records import Amount, Count, Record
@@ -108,7 +107,7 @@ class Checkpoints:
         except tensors.BadTensors as error:
             raise self._damaged(error) from error
 
-    def save(self, trainer: Trainer, progress: TrainingProgress, rows: list[MetricRow], about: dict[str, Any]) -> None:
+    def save(self, trainer: Trainer, progress: TrainingProgress, rows: list[MetricRow], about: dict[str, Json]) -> None:
         """Writes the files of a period.
 
         `rows` are the metrics of its last epoch, which `metric_rows` has written; `about` becomes metadata of the

@@ -11,13 +11,13 @@ import re
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.methods import loading, registry
 from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, Trainer, TrainingSetup
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import folder_config, hashing
+from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.training import metric_rows, timing
@@ -87,7 +87,7 @@ def train(
     return checkpoints
 
 
-def config(learner: Learner, setup: TrainingSetup, seeds: Sequence[int]) -> dict[str, Any]:
+def config(learner: Learner, setup: TrainingSetup, seeds: Sequence[int]) -> dict[str, Json]:
     """What a training depends on; a training with another config does not continue it."""
     return {
         "method": learner.name,
@@ -198,7 +198,7 @@ class _TrainingRun:
         returns = self._curve.last_point()
         return "val " + " ".join(f"{value:.1f}" for value in returns.values()) if returns else ""
 
-    def _about(self) -> dict[str, Any]:
+    def _about(self) -> dict[str, Json]:
         """What a file of weights says about itself."""
         learner = self._learner
         return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from numbers import Integral
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -38,6 +38,14 @@ class Step:
     def ended(self) -> np.ndarray:
         """True for episodes that are over, shape (n,)."""
         return self.terminated | self.truncated
+
+
+class _Copied(TypedDict):
+    """What a copy of an engine needs to continue all episodes."""
+
+    threads: int
+    episodes: dict[str, np.ndarray]
+    paths: tuple[np.ndarray, np.ndarray]
 
 
 class Engine:
@@ -141,12 +149,12 @@ class Engine:
         for name, rows in self._episode_arrays().items():
             rows[ids] = saved[name]
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> _Copied:
         """What a copy, or another process, needs to continue all episodes."""
         episodes = self.save(np.arange(self.slots))
         return {"threads": self._threads, "episodes": episodes, "paths": (self._positions, self._quaternions)}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: _Copied) -> None:
         ids = np.arange(len(state["episodes"]["state"]))
         self.__init__(len(ids), state["threads"])
         self._positions[:], self._quaternions[:] = state["paths"]

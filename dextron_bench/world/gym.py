@@ -224,16 +224,19 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
             self._infos.begin(slot, setting)
         self._returns[slots], self._steps[slots] = 0.0, 0
 
-    def _restart(self, diverged: np.ndarray) -> dict[str, Any]:
+    def _restart(self, diverged: np.ndarray) -> infos.Columns:
         """Begins the next episode where one is over; the info has the last state and info of the old episode."""
         assert self._ended is not None
         over = self._ended
-        final = {"final_obs": infos.objects(self._states.copy(), over), "final_info": self._info(over, diverged)}
+        final: infos.Columns = {
+            "final_obs": infos.objects(self._states.copy(), over),
+            "final_info": self._info(over, diverged),
+        }
         self._begin(np.flatnonzero(over))
         self._ended = np.zeros(self.num_envs, bool)
         masks = {f"_{key}": over.copy() for key in final}
         return final | masks | self._info(np.ones(self.num_envs, bool), np.zeros(self.num_envs, bool))
 
-    def _info(self, mask: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:
+    def _info(self, mask: np.ndarray, diverged: np.ndarray) -> infos.Columns:
         """The info of the slots of `mask` (n,), in which simulations have `diverged` (n,)."""
         return self._infos.of(mask, self._returns, np.where(diverged, DIVERGED, "").astype(object))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
 from dextron_bench.reaches.setting import Setting, plain
 from dextron_bench.world import task
 
+Columns: TypeAlias = dict[str, "np.ndarray | Columns"]  # Of many slots, by name; the columns of a setting are inside.
 
-def single(setting: Setting, episode_return: float, failure: str) -> dict[str, Any]:
+
+def single(setting: Setting, episode_return: float, failure: str) -> dict[str, str | float | dict[str, str | float]]:
     """The info of one episode."""
     is_success = episode_return >= task.SUCCESS
     return {"setting": plain(setting), "episode_return": episode_return, "is_success": is_success, "failure": failure}
@@ -29,7 +31,7 @@ class SlotInfos:
         for name, numbers in self._numbers.items():
             numbers[slot] = getattr(setting, name)
 
-    def of(self, mask: np.ndarray, returns: np.ndarray, failures: np.ndarray) -> dict[str, Any]:
+    def of(self, mask: np.ndarray, returns: np.ndarray, failures: np.ndarray) -> Columns:
         """The info of the slots where `mask` (n,) is true; other entries are empty. Each name has a mask."""
         return _masked(
             {
@@ -50,13 +52,13 @@ def objects(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return kept
 
 
-def _masked(columns: dict[str, Any], mask: np.ndarray) -> dict[str, Any]:
+def _masked(columns: Columns, mask: np.ndarray) -> Columns:
     """Copies of the columns with a mask for each; a number is 0 and an object None where it is false."""
-    infos: dict[str, Any] = {}
+    infos: Columns = {}
     for name, column in columns.items():
         if isinstance(column, dict):
             infos[name] = _masked(column, mask)
         else:
-            infos[name] = np.where(mask, column, None if column.dtype == object else column.dtype.type(0))
+            infos[name] = np.where(mask, column, np.array(None if column.dtype == object else 0, column.dtype))
         infos[f"_{name}"] = mask.copy()
     return infos

@@ -9,7 +9,7 @@ import hashlib
 import json
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
@@ -92,8 +92,17 @@ def state_names() -> tuple[str, ...]:
     return tuple(_constants()["state_names"])
 
 
+class HandConstants(TypedDict):
+    """What functions of states need of the model: names, indices and angles of joints."""
+
+    state_names: list[str]
+    proximal: list[int]
+    closed: list[float]
+    start: list[float]
+
+
 @cache
-def _constants() -> dict[str, Any]:
+def _constants() -> HandConstants:
     """What `tools/hand_constants.py` took from the model."""
     return json.loads(files("dextron_bench.world").joinpath("hand.json").read_text(encoding="utf-8"))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from dextron_bench.experts import database
 from dextron_bench.experts.database import DamagedDatabase
 from dextron_bench.experts.montecarlo import Search
+from dextron_bench.storage import atomic
 from tests.helpers.short_reaches import SOURCE
 
 SEARCH = Search("brief", seed=7, experts=3, block=2)
@@ -48,11 +50,11 @@ def test_only_draws_above_1_are_kept_and_are_loaded_bit_for_bit(draws: pd.DataFr
 def test_the_summary_counts_all_draws(draws: pd.DataFrame, tmp_path: Path):
     file, about = database.save(draws, SOURCE, SEARCH, tmp_path, "experts-brief")
     assert file == tmp_path / "experts-brief.parquet"
-    counts = {name: about[name] for name in ("draws", "settings", "kept", "solved")}
+    counts = {name: getattr(about, name) for name in ("draws", "settings", "kept", "solved")}
     assert counts == {"draws": 6, "settings": 2, "kept": 3, "solved": 2}
-    assert about["search"] == {"reaches": "brief", "seed": 7, "experts": 3, "block": 2}
-    assert json.loads(file.with_suffix(".json").read_text()) == json.loads(json.dumps(about))
-    assert database.summary(file)["digest"] == database.rows_digest(database.load(file))
+    assert asdict(about.search) == {"reaches": "brief", "seed": 7, "experts": 3, "block": 2}
+    assert json.loads(file.with_suffix(".json").read_text()) == json.loads(atomic.json_text(about))
+    assert database.summary(file).digest == database.rows_digest(database.load(file))
 
 
 def test_statistics_by_hand(draws: pd.DataFrame):

@@ -144,8 +144,8 @@ def test_two_machines_are_named_in_the_summary(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(provenance, "collect", lambda physics: {"machine": {"cpu": "of the merge"}})
     work_in(tmp_path).check_complete()
     _, about = database.save(search(tmp_path, rows=3), SOURCE, SMALL, tmp_path, "experts")
-    makers = about["provenance"]
-    assert [makers["machine"]["cpu"], *(maker["machine"]["cpu"] for maker in makers["others"])] == ["large", "small"]
+    makers = about.provenance
+    assert [makers.machine.cpu, *(maker.machine.cpu for maker in makers.others)] == ["large", "small"]
 
 
 def test_outcomes_equal_the_outcomes_of_experts_played_one_by_one(tmp_path):

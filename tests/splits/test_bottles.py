@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 
 from dextron_bench.splits import bottles, loading, tracks
 from dextron_bench.splits.near_equal import SETTING
+from dextron_bench.storage import atomic, records
 from dextron_bench.world.bottles import model_bottle
 
 MASS = tracks.BOTTLES["bottle-mass"]
@@ -85,11 +85,12 @@ def test_a_track_changes_one_quantity_within_its_range(track: tracks.Track):
 
 
 def test_the_tables_are_read_as_splits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    (tmp_path / "splits.json").write_text(json.dumps({"synthetic": {"test": {"rows": 40}}, "real": {}}))
+    known = {"synthetic": {"test": loading.SplitEntry(40, "d")}, "real": {}}
+    atomic.write_json(tmp_path / "splits.json", known)
     scanner: Any = LightOnly(1.0)
     entries = bottles.build(scanner, PLAIN, tmp_path)
-    catalogue = json.loads((tmp_path / "splits.json").read_text())
-    assert catalogue == {"synthetic": {"test": {"rows": 40}, **entries}, "real": {}}
+    catalogue = records.read(tmp_path / "splits.json", loading.Catalogue)
+    assert catalogue == {"synthetic": known["synthetic"] | entries, "real": {}}
     monkeypatch.setattr(loading, "_catalogue", lambda: catalogue)
     monkeypatch.setattr(loading, "_table", lambda _, name: pd.read_parquet(tmp_path / name))
     split = loading.load_split("synthetic", "test+bottle-radius")

@@ -1,7 +1,5 @@
 """Splits share no held-out reach, subject or setting, and a scan measures how hard each row is."""
 
-import json
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -14,8 +12,9 @@ from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.splits import building, building_minjerk
 from dextron_bench.splits.building import Sizes, TooFewRows
-from dextron_bench.splits.loading import cases_from_frame, split_digest
+from dextron_bench.splits.loading import Catalogue, cases_from_frame, split_digest
 from dextron_bench.splits.near_equal import SETTING
+from dextron_bench.storage import records
 from dextron_bench.world.engine import Engine
 
 SIZES = Sizes(evaluated=20, val=10, open=5, reaches=0.25)
@@ -139,12 +138,12 @@ def test_unsolved_minjerk_reaches_are_skipped(monkeypatch):
 def test_writing_minjerk_keeps_the_other_sources(tmp_path):
     (tmp_path / "splits.json").write_text('{"real": {}}')
     entry = building_minjerk.build(tmp_path, Engine(8, 1), 0, FEW)
-    assert json.loads((tmp_path / "splits.json").read_text()) == {"real": {}, "minjerk": entry}
+    assert records.read(tmp_path / "splits.json", Catalogue) == {"real": {}, "minjerk": entry}
     table = pd.read_parquet(tmp_path / "splits-minjerk.parquet")
     assert table.columns.tolist() == building.COLUMNS
     assert table["split"].tolist() == ["train"] * 2 + ["val"] + ["test"] * 2
     assert set(table["window"]) <= {0.0, 0.445, 0.89}
-    assert entry["val"]["digest"] == split_digest(table[table["split"] == "val"])
+    assert entry["val"].digest == split_digest(table[table["split"] == "val"])
 
 
 def test_every_source_except_minjerk_needs_a_database(tmp_path, capsys):

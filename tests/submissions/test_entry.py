@@ -15,7 +15,7 @@ def test_settings_of_an_installed_method_are_complete():
     """With these settings the method can be made again."""
     settings = entry.whole_settings("omega", {"near": 0.1}, "synthetic")
     assert settings["near"] == 0.1
-    assert len(settings["sha256"]) == 64
+    assert len(str(settings["sha256"])) == 64
     assert entry.whole_settings("omega", settings, "synthetic") == settings
     assert entry.whole_settings("mine.py:Mine", {"near": 0.1}, "synthetic") == {"near": 0.1}
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.evaluation.diagnosis import CAUSES
-from dextron_bench.experts import database
+from dextron_bench.experts import database, montecarlo
 from dextron_bench.storage import atomic
 from dextron_bench.world import model
 from tools import documents
@@ -68,10 +68,10 @@ def test_a_table_of_the_results_on_a_source(board: Path):
 def test_numbers_of_the_search(board: Path, monkeypatch: pytest.MonkeyPatch):
     """30 of 1,200 draws are 2.50 %; by d_c, half of 40 draws are solved."""
     rows = [
-        {"by": "d_c", "value": "0.0 to 0.1", "solved_rate": 0.5},
-        {"by": "region", "value": "13", "solved_rate": 0.04},
+        database.Group("d_c", "0.0 to 0.1", 40, 20, 20, 0.5, 0.5),
+        database.Group("region", "13", 100, 4, 4, 0.04, 0.04),
     ]
-    summary = {"draws": 1200, "settings": 150, "kept": 30, "solved": 12, "statistics": rows}
+    summary = database.Summary(montecarlo.Search(), "", 1200, 150, 30, 12, rows)
     monkeypatch.setattr(database, "load_shipped", lambda reaches: (None, summary))
     assert filled(board, number("search real draws")) == "<!--=search real draws-->1,200<!--.-->"
     assert filled(board, number("search real kept_rate")) == "<!--=search real kept_rate-->2.50<!--.-->"

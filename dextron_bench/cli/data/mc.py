@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
 from dextron_bench.cli.support.pieces import PieceFlags, Pieces
+
+if TYPE_CHECKING:
+    from dextron_bench.experts.database import Summary
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,8 @@ class MonteCarlo:
     """Print the summary as JSON."""
 
     def __call__(self) -> int:
+        from msgspec import to_builtins
+
         from dextron_bench.experts import database, montecarlo, search_work
         from dextron_bench.storage.pieces import Place
 
@@ -48,19 +53,20 @@ class MonteCarlo:
         if self.extend:
             rows, summary = database.load_shipped(self.reaches)
             database.check_physics(summary)
-            work.restore(rows, summary["settings"] // search.block)
+            work.restore(rows, summary.settings // search.block)
         if self.pieces.play_blocks(work, self.runs, self.threads, self.quiet):
             return DONE
         with progress_bar("rows of return 20", self.quiet) as progress:
             draws = work.run(progress)
         file, summary = database.save(draws, work.source, search, folder, f"experts-{self.reaches}")
-        print_json(summary) if self.json else self._print(summary, file)
+        print_json(to_builtins(summary)) if self.json else self._print(summary, file)
         return DONE
 
-    def _print(self, summary: dict[str, Any], file: Path) -> None:
+    def _print(self, summary: Summary, file: Path) -> None:
         columns = ["by", "value", "draws", "kept", "solved", "kept [%]", "solved [%]"]
         rows = [
-            [*list(row.values())[:5], 100 * row["kept_rate"], 100 * row["solved_rate"]] for row in summary["statistics"]
+            [row.by, row.value, row.draws, row.kept, row.solved, 100 * row.kept_rate, 100 * row.solved_rate]
+            for row in summary.statistics
         ]
-        print_table(f"{self.reaches}: {summary['kept']} of {summary['draws']} draws kept", columns, rows)
-        print(f"{summary['kept']} rows ({summary['solved']} of return 20) of {summary['draws']} draws: {file}")
+        print_table(f"{self.reaches}: {summary.kept} of {summary.draws} draws kept", columns, rows)
+        print(f"{summary.kept} rows ({summary.solved} of return 20) of {summary.draws} draws: {file}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
@@ -13,6 +13,8 @@ from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from dextron_bench.splits.loading import SplitEntry
 
 
 class NeedsSource(ValueError):
@@ -57,7 +59,7 @@ class Splits:
         if self.reaches is None:
             raise NeedsSource("--into builds the splits of one source: give --reaches")
         entry = self._build(self.reaches, self.into)
-        rows = [(name, split["rows"], split["digest"][:8]) for name, split in entry.items()]
+        rows = [(name, split.rows, split.digest[:8]) for name, split in entry.items()]
         print_table(f"splits of {self.reaches} reaches in {self.into}", ["split", "rows", "version"], rows)
         return DONE
 
@@ -69,7 +71,7 @@ class Splits:
         print_table("splits", ["reaches", "split", "rows", "version"], rows)
         return DONE
 
-    def _build(self, reaches: SourceName, into: Path) -> dict[str, dict[str, Any]]:
+    def _build(self, reaches: SourceName, into: Path) -> dict[str, SplitEntry]:
         from dextron_bench.experts import database as experts_database
         from dextron_bench.experts import montecarlo
         from dextron_bench.reaches.sources import open_source

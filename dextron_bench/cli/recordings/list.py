@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -69,10 +69,10 @@ class List(EpisodeFlags):
         return [undamaged[place] for place in selection.best_and_worst(table, episode_filter).index]
 
 
-def _row(summary: Summary) -> dict[str, Any]:
+def _row(summary: Summary) -> dict[str, str | float | None]:
     from dextron_bench.catalogue import episodes
 
-    row: dict[str, Any] = {"file": str(summary.file)}
+    row: dict[str, str | float | None] = {"file": str(summary.file)}
     row |= {title: summary.properties.get(name) for name, title in COLUMNS.items()}
     is_pair = "pair" in summary.properties
     row["outcome"] = "a pair" if is_pair else row["outcome"]

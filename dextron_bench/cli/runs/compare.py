@@ -62,7 +62,7 @@ def _setting(entry: Entry, name: str) -> Any:
     return {"code": code_of(entry), "physics": entry.physics, **entry.settings}.get(name)
 
 
-def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+def _scores(entries: Sequence[Entry]) -> list[dict[str, str | None]]:
     """Two rows for each split, with each run's mean return and its success rate [%], and their intervals."""
     splits = dict.fromkeys(split for entry in entries for split in entry.scores)
     return [

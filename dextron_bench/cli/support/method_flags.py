@@ -6,12 +6,15 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from dextron_bench.cli.support import streams, usage
 from dextron_bench.cli.support.usage import FIELD
+
+if TYPE_CHECKING:
+    from dextron_bench.methods.settings import Settings
 
 COMMANDS = ("run", "eval", "sweep", "sweep cross-validate")  # They take the settings of --method.
 OF_AGENTS = ("check", "submit")  # They take the settings of an agent, their first word.
@@ -69,12 +72,12 @@ def as_bad_settings(words: Sequence[str]) -> Iterator[None]:
         ) from error
 
 
-def settings_dict(settings: Any) -> dict[str, Any]:
+def settings_dict(settings: Any) -> Settings:
     """The settings in a command's field, by name."""
     return {} if settings is None else {f.name: getattr(settings, f.name) for f in dataclasses.fields(settings)}
 
 
-def changed_settings(settings: Any) -> dict[str, Any]:
+def changed_settings(settings: Any) -> Settings:
     """The settings in a command's field that are not the defaults, by name."""
     from dextron_bench.methods.settings import default
 

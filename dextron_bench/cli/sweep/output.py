@@ -58,9 +58,9 @@ def draw(content: SweepContent, trials: list[Trial], file: Path) -> None:
 
     question, (setting,) = content.question, content.question.space
     points = [
-        sweeps.Point(float(trial.settings[setting]), trial.returns, trial.successes)
+        sweeps.Point(float(value), trial.returns, trial.successes)
         for trial in trials
-        if trial.returns and trial.successes
+        if trial.returns and trial.successes and isinstance(value := trial.settings[setting], int | float)
     ]
     seeds = " ".join(map(str, question.seeds))
     title = f"{question.method} on val of {question.reaches} reaches, seeds {seeds}"

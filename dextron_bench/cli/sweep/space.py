@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shlex
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import tyro
@@ -65,13 +65,9 @@ def _part(flag: str, text: str, parser: type, values: str) -> Choices | Range:
 
 def _parser(cls: type, field: dataclasses.Field[Any]) -> type:
     """A class with this field alone, so that its flag is parsed as `run` parses it; a boolean takes True or False."""
-    hint: Any = _hints(cls).get(field.name, field.type)
+    hint: Any = typing.get_type_hints(cls, include_extras=True).get(field.name, field.type)
     same = dataclasses.field(default_factory=lambda: default(field))
     return dataclasses.make_dataclass("Setting", [(field.name, tyro.conf.FlagConversionOff[hint], same)])
-
-
-def _hints(cls: type) -> Mapping[str, Any]:
-    return typing.get_type_hints(cls, include_extras=True)
 
 
 def _value(flag: str, text: str, parser: type, value: str) -> Any:

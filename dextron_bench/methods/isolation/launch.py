@@ -6,11 +6,11 @@ import json
 from dataclasses import asdict, dataclass, field, replace
 from importlib.machinery import ModuleSpec
 from pathlib import Path
-from typing import Any
 
 from dextron_bench.methods import loading, specs
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import guard, sandbox
+from dextron_bench.methods.settings import Settings
 from dextron_bench.methods.specs import AgentSpec
 from dextron_bench.processes import programs
 
@@ -35,7 +35,7 @@ class Launch:
 
     spec: AgentSpec
     command: tuple[str, ...] = ()
-    settings: dict[str, Any] = field(default_factory=dict)
+    settings: Settings = field(default_factory=dict)
     weights: str = ""
     readable: tuple[str, ...] = ()
     trusted: bool = True
@@ -58,7 +58,7 @@ class Launch:
 
 
 def prepare_launch(
-    text: str, settings: dict[str, Any] | None = None, weights: Path | None = None, trust: bool = False
+    text: str, settings: Settings | None = None, weights: Path | None = None, trust: bool = False
 ) -> Launch:
     """How to start the agent that a text names (see `methods.specs`).
 

@@ -9,9 +9,11 @@ input ends.
 from __future__ import annotations
 
 import json
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
+
+from dextron_bench.storage.atomic import Json
 
 PROTOCOL = 1
 ACTION_SIZE = 40  # [bytes] that one action may take in an answer.
@@ -69,11 +71,11 @@ def max_answer_size(count: int) -> int:
     return HEAD_SIZE + ACTION_SIZE * count
 
 
-def _to_line(message: dict[str, Any]) -> bytes:
+def _to_line(message: Mapping[str, Json]) -> bytes:
     return json.dumps(message, separators=(",", ":")).encode() + b"\n"
 
 
-def _from_line(line: bytes) -> dict[str, Any]:
+def _from_line(line: bytes) -> dict[str, Json]:
     try:
         message = json.loads(line)
     except (ValueError, RecursionError):

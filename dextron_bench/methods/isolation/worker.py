@@ -12,18 +12,38 @@ import sys
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypedDict
 
 import numpy as np
 
 from dextron_bench.methods import loading
 from dextron_bench.methods.isolation import guard, policy_files, protocol
-from dextron_bench.methods.specs import AgentSpec
+from dextron_bench.methods.settings import Settings
+from dextron_bench.methods.specs import AgentSpec, Kind
 from dextron_bench.storage import tensors
 
 
-def main(request: dict[str, Any]) -> None:
-    """Answers questions for the agent of a Launch, given as a dict with its `scratch` folder, until the input ends."""
+class Spec(TypedDict):
+    """The parts of an AgentSpec."""
+
+    kind: Kind
+    name: str
+    location: str
+
+
+class Request(TypedDict):
+    """The parts of a Launch that the process needs, and its `scratch` folder."""
+
+    spec: Spec
+    settings: Settings
+    weights: str
+    readable: list[str]
+    folder: str
+    scratch: str
+
+
+def main(request: Request) -> None:
+    """Answers questions for the agent of a request until the input ends."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # What an agent prints goes to stderr, not among the answers.
     questions = sys.stdin.buffer
@@ -66,7 +86,7 @@ class _Package(MetaPathFinder):
         return self._spec if fullname == self._name else None
 
 
-def _create_agent(spec: AgentSpec, installed: Any, settings: dict[str, Any], weights: str, seed: int) -> Any:
+def _create_agent(spec: AgentSpec, installed: Any, settings: Settings, weights: str, seed: int) -> Any:
     if spec.kind == "policy":
         return policy_files.load(Path(spec.location))
     cls = installed or loading.load_class(spec)
