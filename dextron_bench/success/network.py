@@ -101,24 +101,6 @@ class Fit(Record, frozen=True):
     best_epoch: Count
 
 
-class Search(Record, frozen=True):
-    """The source of reaches of a data set, empty if it is not known."""
-
-    reaches: str = ""
-
-
-class Data(Record, frozen=True):
-    """The search that made a data set."""
-
-    search: Search = Search()
-
-
-class ModelOrigin(Record, frozen=True):
-    """The data set that the file of a model names."""
-
-    data: Data = Data()
-
-
 @cache
 def shipped_model(reaches: str) -> SuccessModel:
     """The success model that ships for a source of reaches; raises MissingModel."""

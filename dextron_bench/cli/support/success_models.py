@@ -18,14 +18,14 @@ def folder_of(runs: Path, reaches: str, seed: int) -> Path:
 
 def load_model(file: Path | None, runs: Path, reaches: str) -> SuccessModel:
     """The model in a file; without one, the model trained in a folder of runs, or else the shipped one."""
-    from dextron_bench.storage import records, tensors
+    from dextron_bench.storage import tensors
     from dextron_bench.success import network, training
 
     trained = folder_of(runs, reaches, 0) / training.MODEL
     if file is None and not trained.exists():
         return network.shipped_model(reaches)
     path = file or trained
-    source = records.read_about(path, network.ModelOrigin).data.search.reaches or reaches
-    if source != reaches:
-        print_warning(f"{path} was trained on {source} reaches, not on {reaches} ones")
+    match tensors.read_about(path):
+        case {"data": {"search": {"reaches": source}}} if source != reaches:
+            print_warning(f"{path} was trained on {source} reaches, not on {reaches} ones")
     return network.SuccessModel(tensors.read(path))
