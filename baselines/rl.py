@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import torch
+from dextron_bench.errors import BadInput
 from torch import Tensor
 
 from baselines import cycle, demonstrations
@@ -19,10 +20,6 @@ from baselines.schedule import SCHEDULES, Exploration, Schedule, Scheduled
 from dextron_bench import Trainer, TrainingSetup
 
 HELD_SHARE = 0.25  # Share of the episodes after the warm start that hold their noise, if `hold` is above 1.
-
-
-class BadExploration(ValueError):
-    """A hold or a number of critics that no training can have."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +35,9 @@ class Rl(Scheduled):
 
     def __post_init__(self) -> None:
         if self.hold < 1:
-            raise BadExploration(f"--hold is {self.hold}; a noise is held for at least 1 step")
+            raise BadInput(f"--hold is {self.hold}; a noise is held for at least 1 step")
         if self.critics not in (1, 2):
-            raise BadExploration(f"--critics is {self.critics}; choose 1 or 2")
+            raise BadInput(f"--critics is {self.critics}; choose 1 or 2")
 
     @property
     def stem(self) -> str:

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import torch
+from dextron_bench.errors import BadInput
 from torch import Tensor
 from torch.nn.functional import layer_norm
 
@@ -31,10 +32,6 @@ POLYAK = 0.005
 ENTROPY = -0.5  # Of the policy, which the temperature keeps: minus half of the number of actions.
 
 
-class BadEnsemble(ValueError):
-    """A number of critics, updates or transitions that no training can have."""
-
-
 @dataclass(frozen=True)
 class Rlpd(Scheduled):
     """SAC that learns from demonstrations and its own episodes in equal parts, with an ensemble of Q."""
@@ -51,7 +48,7 @@ class Rlpd(Scheduled):
     def __post_init__(self) -> None:
         if self.critics < 2 or self.updates < 1 or self.batch < 2 or self.batch % 2:
             flags = f"--critics {self.critics} --updates {self.updates} --batch {self.batch}"
-            raise BadEnsemble(f"{flags}: give 2 critics or more, 1 update or more, and an even batch")
+            raise BadInput(f"{flags}: give 2 critics or more, 1 update or more, and an even batch")
 
     @property
     def stem(self) -> str:

@@ -19,6 +19,7 @@ from dextron_bench.cli.commands import Command
 from dextron_bench.cli.support import method_flags, places, streams, usage
 from dextron_bench.cli.support.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.cli.support.output import print_warning
+from dextron_bench.errors import BadInput
 from dextron_bench.processes import programs
 from dextron_bench.processes.limited_process import memory_advice
 
@@ -61,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parsed(words: Sequence[str]) -> Command:
     """The command that the words select, with checked numbers."""
     if broken := [word for word in words if not _is_utf8(word) or "\0" in word]:
-        raise usage.BadName(name_fault(broken[0]))
+        raise BadInput(name_fault(broken[0]))
     if list(words) == ["--version"]:
         return _print_version
     command = _parse(words)

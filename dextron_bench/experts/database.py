@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import blocks, montecarlo
 from dextron_bench.reaches import setting
 from dextron_bench.storage import atomic, hashing, records
@@ -18,14 +19,6 @@ from dextron_bench.storage.records import Count, Record, Share
 from dextron_bench.world import model, task
 
 BANDS = 9  # Equal bands of d_c in the statistics.
-
-
-class OtherPhysics(ValueError):
-    """A database that was searched with other physics: a search finds other outcomes now."""
-
-
-class DamagedDatabase(ValueError):
-    """A database that cannot be read, or whose rows differ from its summary."""
 
 
 class Group(Record, frozen=True):
@@ -75,7 +68,7 @@ def save(
 
 
 def load(file: Path) -> pd.DataFrame:
-    """The rows of a database, verified against its summary; raises DamagedDatabase, FileNotFoundError."""
+    """The rows of a database, verified against its summary; raises BadInput, FileNotFoundError."""
     expected = summary(file).digest
     try:
         rows = pd.read_parquet(file)
@@ -83,29 +76,29 @@ def load(file: Path) -> pd.DataFrame:
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, FileNotFoundError) or getattr(error, "errno", None) is not None:  # Of the system.
             raise
-        raise DamagedDatabase(f"expert database {file} is damaged ({error}); make it again with `data mc`") from error
+        raise BadInput(f"expert database {file} is damaged ({error}); make it again with `data mc`") from error
     if actual != expected:
-        raise DamagedDatabase(f"expert database {file} does not match its summary; make it again with `data mc`")
+        raise BadInput(f"expert database {file} does not match its summary; make it again with `data mc`")
     return rows
 
 
 def summary(file: Path) -> Summary:
-    """A database's search, counts, statistics and provenance; raises DamagedDatabase, FileNotFoundError."""
+    """A database's search, counts, statistics and provenance; raises BadInput, FileNotFoundError."""
     try:
         return records.convert(json.loads(file.with_suffix(".json").read_text(encoding="utf-8")), Summary)
     except records.Mismatch as error:
-        raise DamagedDatabase(
+        raise BadInput(
             f"summary of expert database {file} is incomplete ({error}); make it again with `data mc`"
         ) from error
     except ValueError as error:
-        raise DamagedDatabase(f"summary of expert database {file} is damaged ({error}); make it again") from error
+        raise BadInput(f"summary of expert database {file} is damaged ({error}); make it again") from error
 
 
 def check_physics(summary: Summary) -> None:
-    """Raises OtherPhysics if the search of a summary was played with other physics than this version's."""
+    """Raises BadInput if the search of a summary was played with other physics than this version's."""
     physics = summary.provenance.physics
     if physics != model.mjcf_hash():
-        raise OtherPhysics(
+        raise BadInput(
             f"the database was searched with physics {physics[:8] or 'unknown'}, and this version has "
             f"{model.mjcf_hash()[:8]}; search again without --extend"
         )

@@ -10,6 +10,7 @@ from dataclasses import MISSING, Field, asdict, field, fields, is_dataclass, mak
 from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import hashing
 from dextron_bench.storage.atomic import Json
 
@@ -19,7 +20,7 @@ PLAIN = (bool, int, float, str, tuple, type(None))  # Types of defaults; a param
 LONGEST_VALUE = 24  # Characters of a setting's value in a label.
 
 
-class BadSettings(ValueError):
+class BadSettings(BadInput):
     """Settings that a method does not have, or refuses."""
 
 

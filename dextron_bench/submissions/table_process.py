@@ -16,6 +16,8 @@ from typing import TypedDict
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from dextron_bench.errors import BadInput
+
 SETTING = ("reach", "offset_x", "offset_y", "duration_noise")
 FLAGS, NUMBERS = ("success", "terminated", "truncated"), (*SETTING[1:], "score", "closing_lag")
 TEXTS, COUNTS = ("split", "digest", "reach", "failure", "cause", "trace"), ("row", "length")
@@ -37,7 +39,7 @@ class Limits(TypedDict):
     lists: dict[str, int]
 
 
-class BadTable(ValueError):
+class BadTable(BadInput):
     """A table that no run writes; the message does not name the file."""
 
 

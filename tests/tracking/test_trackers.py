@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from dextron_bench.errors import MissingPackage
 from rerun.chunk import RrdReader
 
 from dextron_bench.tracking import films, packages, trackers
@@ -118,5 +119,5 @@ def test_rerun_reads_curves_and_episodes(tmp_path: Path):
 def test_a_tracker_without_its_package_is_named(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(packages.importlib.util, "find_spec", lambda name: None)
     packages.require(["rerun"])
-    with pytest.raises(packages.MissingTracker, match=r"needs the package of this name: `pip install wandb`"):
+    with pytest.raises(MissingPackage, match=r"needs the package of this name: `pip install wandb`"):
         packages.require(["rerun", "wandb"])

@@ -14,6 +14,7 @@ from importlib.abc import MetaPathFinder
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods.isolation import sandbox
 
 PUBLIC = {  # Modules of the benchmark that agents may import, and the modules that these import (docs/agents.md).
@@ -42,7 +43,7 @@ WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 DEVICES = ("/dev/null", "/dev/urandom", "/dev/random", "/proc/cpuinfo", "/proc/meminfo", "/proc/self", "/sys/devices")
 
 
-class NotForAgents(PermissionError):
+class NotForAgents(BadInput):
     """An agent tried something that it may not do."""
 
     def __init__(self, action: str) -> None:

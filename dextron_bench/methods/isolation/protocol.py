@@ -13,6 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage.atomic import Json
 
 PROTOCOL = 1
@@ -20,7 +21,7 @@ ACTION_SIZE = 40  # [bytes] that one action may take in an answer.
 HEAD_SIZE = 4096  # [bytes] that the rest of an answer may take.
 
 
-class BadAnswer(ValueError):
+class BadAnswer(BadInput):
     """A line that does not follow the protocol."""
 
 
