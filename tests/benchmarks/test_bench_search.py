@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from pathlib import Path as File
+from pathlib import Trajectory as File
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from dextron_bench.experts import blocks, branching, montecarlo, outcomes
 from dextron_bench.experts.montecarlo import Search
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.reaches.recorded import cache
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.reaches.sources import open_source
@@ -33,7 +33,7 @@ class TimedSource:
     def __init__(self, source: Source) -> None:
         self._source, self.seconds = source, 0.0
 
-    def path(self, setting: Setting) -> Path:
+    def path(self, setting: Setting) -> Trajectory:
         """The path of the source."""
         start = time.perf_counter()
         path = self._source.path(setting)
