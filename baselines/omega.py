@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from dextron_bench import SuccessModel
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.sources import SOURCES
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.success import network
@@ -17,14 +18,6 @@ from dextron_bench.world import task
 
 FILE = ".safetensors"  # A model that ends so is a file, else it is a source of reaches.
 OPEN = -1.0  # The default action of a hand that is far away, and of the first step.
-
-
-class BadRule(ValueError):
-    """A tolerance outside [0, 1], or a distance below 0."""
-
-
-class NoModel(ValueError):
-    """The success model does not exist, or has another hash than the settings say."""
 
 
 @dataclass(frozen=True)
@@ -45,33 +38,33 @@ class Omega:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.tolerance <= 1.0:
-            raise BadRule(f"--tolerance is {self.tolerance:g}; a difference of probabilities lies between 0 and 1")
+            raise BadInput(f"--tolerance is {self.tolerance:g}; a difference of probabilities lies between 0 and 1")
         if not self.near >= 0.0:
-            raise BadRule(f"--near is {self.near:g}; a distance is 0 or more")
+            raise BadInput(f"--near is {self.near:g}; a distance is 0 or more")
 
     def for_source(self, reaches: str) -> Self:
-        """The method with the model of a source of reaches and its hash in its settings; raises NoModel."""
+        """The method with the model of a source of reaches and its hash in its settings; raises BadInput."""
         named = replace(self, model=self.model or reaches)
         return replace(named, sha256=named.digest())
 
     def agent(self, seed: int) -> OmegaAgent:
-        """The agent, the same for every seed; raises NoModel, BadModel, BadTensors."""
+        """The agent, the same for every seed; raises BadInput, BadTensors."""
         self.digest()
         file = Path(self.model)
         model = SuccessModel(tensors.read(file)) if self.model.endswith(FILE) else network.shipped_model(self.model)
         return OmegaAgent(model, self.tolerance, self.near)
 
     def digest(self) -> str:
-        """The SHA-256 of the model's file, compared with `sha256` if that is set; raises NoModel, BadTensors."""
+        """The SHA-256 of the model's file, compared with `sha256` if that is set; raises BadInput, BadTensors."""
         if not self.model.endswith(FILE) and self.model not in SOURCES:
             sources = ", ".join(SOURCES)
-            raise NoModel(f"--model takes the file of a model (*{FILE}) or one of {sources}, not {self.model!r}")
+            raise BadInput(f"--model takes the file of a model (*{FILE}) or one of {sources}, not {self.model!r}")
         try:
             digest = hashing.sha256(Path(self.model)) if self.model.endswith(FILE) else network.model_digest(self.model)
         except (OSError, network.MissingModel) as error:
-            raise NoModel(f"there is no success model ({error}); --model takes the file of one") from error
+            raise BadInput(f"there is no success model ({error}); --model takes the file of one") from error
         if digest != (self.sha256 or digest):
-            raise NoModel(f"the success model {self.model!r} has the SHA-256 {digest}, not {self.sha256}")
+            raise BadInput(f"the success model {self.model!r} has the SHA-256 {digest}, not {self.sha256}")
         return digest
 
 

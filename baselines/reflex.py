@@ -7,11 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
 from dextron_bench.world import task
-
-
-class BadDistance(ValueError):
-    """A distance below 0."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +22,7 @@ class Reflex:
 
     def __post_init__(self) -> None:
         if not self.near >= 0.0:
-            raise BadDistance(f"--near is {self.near:g}; a distance is 0 or more")
+            raise BadInput(f"--near is {self.near:g}; a distance is 0 or more")
 
     def agent(self, seed: int) -> ReflexAgent:
         """An agent; it is the same for every seed."""

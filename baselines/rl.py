@@ -17,12 +17,9 @@ from baselines.random_streams import BATCHES, NOISE, Draws
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import SCHEDULES, Exploration, Schedule, Scheduled
 from dextron_bench import Trainer, TrainingSetup
+from dextron_bench.errors import BadInput
 
 HELD_SHARE = 0.25  # Share of the episodes after the warm start that hold their noise, if `hold` is above 1.
-
-
-class BadExploration(ValueError):
-    """A hold or a number of critics that no training can have."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +35,9 @@ class Rl(Scheduled):
 
     def __post_init__(self) -> None:
         if self.hold < 1:
-            raise BadExploration(f"--hold is {self.hold}; a noise is held for at least 1 step")
+            raise BadInput(f"--hold is {self.hold}; a noise is held for at least 1 step")
         if self.critics not in (1, 2):
-            raise BadExploration(f"--critics is {self.critics}; choose 1 or 2")
+            raise BadInput(f"--critics is {self.critics}; choose 1 or 2")
 
     @property
     def stem(self) -> str:

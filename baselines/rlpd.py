@@ -25,14 +25,11 @@ from baselines.random_streams import BATCHES, NOISE, PAIRS, Draws
 from baselines.sac import DISCOUNT, LEARNING_RATE, Batch, action_value_target
 from baselines.schedule import SCHEDULES, Scheduled
 from dextron_bench import Trainer, TrainingSetup
+from dextron_bench.errors import BadInput
 
 WARM_START = 1000  # Frames with random actions, before the first update.
 POLYAK = 0.005
 ENTROPY = -0.5  # Of the policy, which the temperature keeps: minus half of the number of actions.
-
-
-class BadEnsemble(ValueError):
-    """A number of critics, updates or transitions that no training can have."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ class Rlpd(Scheduled):
     def __post_init__(self) -> None:
         if self.critics < 2 or self.updates < 1 or self.batch < 2 or self.batch % 2:
             flags = f"--critics {self.critics} --updates {self.updates} --batch {self.batch}"
-            raise BadEnsemble(f"{flags}: give 2 critics or more, 1 update or more, and an even batch")
+            raise BadInput(f"{flags}: give 2 critics or more, 1 update or more, and an even batch")
 
     @property
     def stem(self) -> str:

@@ -13,15 +13,12 @@ from baselines import expert_windows, generated_reaches, openings, pose_features
 from baselines.normalise import CLIP
 from baselines.stopping_trainer import EDGE
 from dextron_bench import Perceptron, Setting, Trainer, TrainingSetup
+from dextron_bench.errors import BadInput
 from dextron_bench.experts.openings import EVERY, NEAR, SUCCEEDS, Episode
 from dextron_bench.methods.exact import rounded
 from dextron_bench.world import task
 
 NEARBY = 5  # Chosen on `val` and on settings that are drawn like the rows of `hard` (docs/baselines.md).
-
-
-class BadNumber(ValueError):
-    """A negative number of settings, or one that needs forks where there are none."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +46,13 @@ class Stopping:
 
     def __post_init__(self) -> None:
         if self.settings < 0:
-            raise BadNumber(f"--settings is {self.settings}; give how many to learn from, or 0 for all")
+            raise BadInput(f"--settings is {self.settings}; give how many to learn from, or 0 for all")
         if self.nearby < 0:
-            raise BadNumber(f"--nearby is {self.nearby}; give how many to try near each setting, or 0 for none")
+            raise BadInput(f"--nearby is {self.nearby}; give how many to try near each setting, or 0 for none")
         if self.generated < 0:
-            raise BadNumber(f"--generated is {self.generated}; give how many to try on new reaches, or 0 for none")
+            raise BadInput(f"--generated is {self.generated}; give how many to try on new reaches, or 0 for none")
         if self.labels == "windows" and (self.nearby != NEARBY or self.generated):
-            raise BadNumber("--labels windows knows only settings of `train`; leave out --nearby and --generated")
+            raise BadInput("--labels windows knows only settings of `train`; leave out --nearby and --generated")
 
     @property
     def label(self) -> str:

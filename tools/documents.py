@@ -50,7 +50,7 @@ class UnknownNumber(LookupError):
 def fill(files: Iterable[Path], board: Path) -> list[Path]:
     """Writes the present value of every number into Markdown files; returns the files that changed.
 
-    `board` is the leaderboard's folder. Raises UnknownNumber, DamagedFile, DamagedDatabase, DamagedSplit.
+    `board` is the leaderboard's folder. Raises UnknownNumber, DamagedFile, BadInput.
     """
     value = _values(board)
     changed = []

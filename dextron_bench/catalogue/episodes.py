@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.results import RunConfig
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded import parsing
@@ -49,14 +50,10 @@ PROPERTIES = ("method", "reaches", "seed", "split", "row")  # Of the recording o
 STATE = "final"  # The last state of an episode; tables of earlier versions lack it.
 
 
-class NoEpisodes(ValueError):
-    """A place without runs or recordings, or a filter that no episode passes."""
-
-
 def read(places: Sequence[Path]) -> pd.DataFrame:
     """The episodes of all runs at places: COLUMNS, `digest` of the split, and STATE; the index is a key of each.
 
-    Raises NoEpisodes, DamagedFile.
+    Raises BadInput, DamagedFile.
     """
     table = pd.concat([_episodes(run) for run in runs_at(places)])
     return table[~table.index.duplicated()]
@@ -92,7 +89,7 @@ def cause(summary: Summary) -> str | None:
 def with_actions(table: pd.DataFrame) -> pd.DataFrame:
     """The episodes of a table with the `actions` (T,) in their runs, None if they were not kept.
 
-    Raises NoEpisodes if a run has changed since, and DamagedFile.
+    Raises BadInput if a run has changed since, and DamagedFile.
     """
     actions = []
     stored = {run: run_files.stored_episodes(RunFolder(Path(run)), ()) for run in table["run"].unique()}
@@ -100,20 +97,20 @@ def with_actions(table: pd.DataFrame) -> pd.DataFrame:
         rows = stored[episode["run"]]
         rows = rows[(rows["split"] == episode["split"]) & (rows["row"] == episode["row"])] if len(rows) else rows
         if len(rows) != 1 or rows["score"].iloc[0] != episode["return"]:
-            raise NoEpisodes(f"{episode['run']} has changed since its episodes were read; start the command again")
+            raise BadInput(f"{episode['run']} has changed since its episodes were read; start the command again")
         actions.append(rows["actions"].iloc[0] if "actions" in rows else None)
     return table.assign(actions=pd.Series(actions, table.index, object))
 
 
 def runs_at(places: Sequence[Path]) -> list[RunFolder]:
-    """The folders of runs at or below places, each once; raises NoEpisodes."""
+    """The folders of runs at or below places, each once; raises BadInput."""
     runs: dict[RunFolder, None] = {}
     for place in places:
         if place.is_file():
-            raise NoEpisodes(f"{place} is a file, and episodes are selected from runs; name a run's folder instead")
+            raise BadInput(f"{place} is a file, and episodes are selected from runs; name a run's folder instead")
         place_runs = list(below(place, RunFolder(place).episodes.name))
         if not place_runs:
-            raise NoEpisodes(f"no runs at {place} to select episodes from; make one with `dextron-bench run`")
+            raise BadInput(f"no runs at {place} to select episodes from; make one with `dextron-bench run`")
         runs |= dict.fromkeys(place_runs)
     return list(runs)
 

@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
+
 LONGEST = 1000  # Characters of an expression.
 KEYWORD = "return_"  # Stands for the column `return`, which is no name in Python.
 SPELLINGS = {"return": KEYWORD, "AND": "and", "OR": "or", "NOT": "not", "IN": "in", "=": "=="}
@@ -29,7 +31,7 @@ ORDERS = {
 ALLOWED = "names of columns, texts, numbers, comparisons, in, and, or, not"
 
 
-class BadExpression(ValueError):
+class BadExpression(BadInput):
     """An expression that is no filter of the table; the message says why."""
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dextron_bench.catalogue.exported_runs import RUNNING, ExportedRun
+from dextron_bench.errors import BadInput, Failed
 from dextron_bench.storage import folders, home
 from dextron_bench.storage.folders import visible
 
@@ -22,15 +23,7 @@ UNKNOWN = 1  # [ms since 1970] MLflow puts the present in the place of a begin t
 FORBIDDEN = re.compile(r"[^/\w.\- :]")  # In the names of MLflow; a split under a track has a +.
 
 
-class NotEmpty(ValueError):
-    """A folder that holds something already."""
-
-
-class NotWritten(RuntimeError):
-    """An export that MLflow's client cannot write."""
-
-
-class NoMlflow(ValueError):
+class NoMlflow(BadInput):
     """MLflow's client is not installed."""
 
     def __init__(self) -> None:
@@ -40,10 +33,10 @@ class NoMlflow(ValueError):
 def write(runs: Iterable[ExportedRun], folder: Path) -> None:
     """Writes runs into a database in a new or empty folder, which holds all of it or nothing.
 
-    Raises NotEmpty, NoMlflow, NotWritten, FolderBusy, OSError.
+    Raises BadInput, NoMlflow, Failed, OSError.
     """
     if visible(folder, "*"):
-        raise NotEmpty(f"{folder} is not empty; choose another folder with --into")
+        raise BadInput(f"{folder} is not empty; choose another folder with --into")
     if any(find_spec(name) is None for name in NEEDED):
         raise NoMlflow
     with folders.replacing(folder) as part, home.lent():
@@ -51,7 +44,7 @@ def write(runs: Iterable[ExportedRun], folder: Path) -> None:
 
 
 def _write_database(runs: Iterable[ExportedRun], database: Path, artifacts: str) -> None:
-    """Writes runs into a new database, and reports nothing to anybody; raises NotWritten."""
+    """Writes runs into a new database, and reports nothing to anybody; raises Failed."""
     os.environ |= {"MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_LOGGING_LEVEL": "WARNING"}
     from mlflow.exceptions import MlflowException  # pyright: ignore[reportMissingImports]  # Of an extra.
     from mlflow.tracking import MlflowClient  # pyright: ignore[reportMissingImports]
@@ -62,7 +55,7 @@ def _write_database(runs: Iterable[ExportedRun], database: Path, artifacts: str)
         for run in runs:
             _write_run(client, experiment, run)
     except MlflowException as error:  # Of a full disk, for example.
-        raise NotWritten(f"MLflow's client cannot write the export: {str(error).splitlines()[0]}") from error
+        raise Failed(f"MLflow's client cannot write the export: {str(error).splitlines()[0]}") from error
 
 
 def _write_run(client: Any, experiment: str, run: ExportedRun) -> None:

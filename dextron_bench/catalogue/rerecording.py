@@ -11,6 +11,7 @@ import pandas as pd
 
 from dextron_bench import recording
 from dextron_bench.catalogue import episodes
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.evaluation.results import RunConfig
@@ -26,14 +27,10 @@ from dextron_bench.world import model
 MISSING = "missing"
 
 
-class Unplayable(ValueError):
-    """An episode that cannot be recorded afterwards; the message says why, and what to do."""
-
-
 def rerecord(table: pd.DataFrame, report: Progress = no_progress) -> list[Path]:
     """The recordings of selected episodes, in order; makes recordings that are missing, damaged or of another episode.
 
-    Raises Unplayable, UnwritableRecording, MissingData, UnknownSplit, and the errors of `episodes.with_actions`.
+    Raises BadInput, UnwritableRecording, MissingData, UnknownSplit, and the errors of `episodes.with_actions`.
     """
     table = episodes.with_actions(table)
     rows = table.to_dict("records")
@@ -66,19 +63,19 @@ def _fault(summary: recording.Summary, row: dict[Any, Any]) -> str:
 
 
 def _check_playable(row: dict[Any, Any], fault: str) -> None:
-    """Raises Unplayable if nothing is left to make a recording from."""
+    """Raises BadInput if nothing is left to make a recording from."""
     run = RunFolder(Path(row["run"]))
     name, advice = f"{row['split']} row {row['row']} of {run.path}", "run the command that made the run again"
     if not hasattr(row.get("actions"), "__len__"):
         problem = "has no recording" if fault == MISSING else f"has a recording that {fault}"
-        raise Unplayable(
+        raise BadInput(
             f"{name} {problem}, and its actions were not kept; remove {run.episodes} and {advice}: "
             "it plays the episodes again and trains nothing"
         )
     if _physics(run) != model.mjcf_hash():
-        raise Unplayable(f"{name} was played with other physics than this version's; remove {run.path} and {advice}")
+        raise BadInput(f"{name} was played with other physics than this version's; remove {run.path} and {advice}")
     if load_split(row["reaches"], row["split"]).digest != row["digest"]:
-        raise Unplayable(f"{name} is of an older version of the split; {advice}")
+        raise BadInput(f"{name} is of an older version of the split; {advice}")
 
 
 def _physics(run: RunFolder) -> str:
@@ -97,16 +94,16 @@ def _record(group: pd.DataFrame) -> Iterator[None]:
     for place, episode in replay(source, split.rows(row["row"] for row in rows), group["actions"].tolist()):
         row = rows[place]
         if episode.setting != settings[place]:
-            raise Unplayable(f"{row['split']} row {row['row']} of {row['run']} is no setting of this split")
+            raise BadInput(f"{row['split']} row {row['row']} of {row['run']} is no setting of this split")
         recording_files.record(run, source, split, row["row"], _as_recorded(row, episode), about)
         yield
 
 
 def _as_recorded(row: dict[Any, Any], episode: Episode) -> Episode:
-    """The episode with the failure in its row; raises Unplayable if the replay differs from the row."""
+    """The episode with the failure in its row; raises BadInput if the replay differs from the row."""
     episode = replace(episode, failure=row["failure"]) if row["failure"] and episode.failure else episode
     if (episode.score, len(episode.actions), episode.failure) != (row["return"], row["steps"], row["failure"]):
-        raise Unplayable(
+        raise BadInput(
             f"{row['split']} row {row['row']} of {row['run']} differs when it is played again: return "
             f"{episode.score:g} after {len(episode.actions)} steps, not {row['return']:g} after {row['steps']}; "
             "play it on the machine and with the versions that its provenance.json names"

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.results import Code, Result, RunConfig
 from dextron_bench.runs import annotations, playing, result_files
 from dextron_bench.storage import records, run_times
@@ -22,10 +23,6 @@ from dextron_bench.world import task
 
 DONE, UNFINISHED = "done", "unfinished"
 VAL = "val"
-
-
-class UnknownRun(LookupError):
-    """A name that no run has, or that several runs have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,14 +84,14 @@ def entries(runs: Path) -> list[Entry]:
 
 
 def find(all_entries: Iterable[Entry], name: str) -> Entry:
-    """The entry with a label, or with a label and a source of reaches; raises UnknownRun."""
+    """The entry with a label, or with a label and a source of reaches; raises NotFound."""
     known = list(all_entries)
     matching = [entry for entry in known if name in (entry.name, entry.label)]
     if len(matching) == 1:
         return matching[0]
     if matching:
-        raise UnknownRun(f"several runs are called {name!r}; choose {' or '.join(entry.name for entry in matching)}")
-    raise UnknownRun(f"no run is called {name!r}; the folder has {', '.join(entry.name for entry in known) or 'none'}")
+        raise NotFound(f"several runs are called {name!r}; choose {' or '.join(entry.name for entry in matching)}")
+    raise NotFound(f"no run is called {name!r}; the folder has {', '.join(entry.name for entry in known) or 'none'}")
 
 
 def _entry(

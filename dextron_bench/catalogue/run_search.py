@@ -8,6 +8,8 @@ from datetime import UTC, date, datetime
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
+from dextron_bench.errors import BadInput
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -19,13 +21,9 @@ ORDERS = ("name", "date", VAL, *SCORES)
 STATES = ("done", "training", "playing", "stopped", "unfinished", "failed")  # The first words of states.
 
 
-class BadSearch(ValueError):
-    """A filter that no run could pass, or an order that does not exist."""
-
-
 @dataclass(frozen=True, slots=True)
 class RunFilter:
-    """Which runs; an option that is not given selects all. Raises BadSearch."""
+    """Which runs; an option that is not given selects all. Raises BadInput."""
 
     method: str = ""
     """A pattern of labels, such as "rlil*"."""
@@ -45,11 +43,11 @@ class RunFilter:
     def __post_init__(self) -> None:
         for text in self.setting:
             if "=" not in text:
-                raise BadSearch(f"--setting {text!r}: write a name and a value, as in near=0.06")
+                raise BadInput(f"--setting {text!r}: write a name and a value, as in near=0.06")
         if self.since:
             _date(self.since)
         if not any(known.startswith(self.state) or self.state.startswith(known) for known in STATES):
-            raise BadSearch(f"--state {self.state!r}: choose from {', '.join(STATES)}")
+            raise BadInput(f"--state {self.state!r}: choose from {', '.join(STATES)}")
 
     def passes(self, entry: Entry) -> bool:
         """True for a run that the filter selects."""
@@ -76,20 +74,20 @@ def matching(entries: Iterable[Entry], run_filter: RunFilter, split: str) -> lis
 def ordered(entries: Iterable[Entry], order: str, split: str) -> list[Entry]:
     """Entries by name, with the newest first by "date", with the highest score on a split first by "return", "success".
 
-    By "val" the highest mean return on `val` comes first. Entries without the score come last. Raises BadSearch.
+    By "val" the highest mean return on `val` comes first. Entries without the score come last. Raises BadInput.
     """
     if order not in ORDERS:
-        raise BadSearch(f"--sort {order!r}: choose from {', '.join(ORDERS)}")
+        raise BadInput(f"--sort {order!r}: choose from {', '.join(ORDERS)}")
     known = sorted(entries, key=lambda entry: (entry.label, entry.reaches))
     table = _table(known, split)
     return [known[place] for place in table.sort_values(order, ascending=order == "name", kind="stable").index]
 
 
 def check_split(entries: Sequence[Entry], split: str) -> None:
-    """Raises BadSearch if runs have played splits, but no run the given one."""
+    """Raises BadInput if runs have played splits, but no run the given one."""
     played = dict.fromkeys(name for entry in entries for name in entry.scores)
     if played and split not in {VAL, *played}:
-        raise BadSearch(f"no run has played {split!r}; there are {', '.join(played)}")
+        raise BadInput(f"no run has played {split!r}; there are {', '.join(played)}")
 
 
 def differing_settings(entries: Sequence[Entry]) -> list[str]:
@@ -143,4 +141,4 @@ def _date(text: str) -> datetime:
     try:
         return datetime.combine(date.fromisoformat(text), datetime.min.time(), UTC)
     except ValueError:
-        raise BadSearch(f"--since {text!r}: write a date such as 2026-01-31") from None
+        raise BadInput(f"--since {text!r}: write a date such as 2026-01-31") from None

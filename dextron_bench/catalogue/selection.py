@@ -9,7 +9,8 @@ from pathlib import Path
 import pandas as pd
 
 from dextron_bench.catalogue import expressions
-from dextron_bench.catalogue.episodes import COLUMNS, NoEpisodes
+from dextron_bench.catalogue.episodes import COLUMNS
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.runs import recording_files
 from dextron_bench.storage.folders import visible
@@ -18,13 +19,9 @@ from dextron_bench.storage.run_folder import TRACKING, RunFolder
 LIMIT = 5  # Episodes that are selected if the filter names no number.
 
 
-class BadFilter(ValueError):
-    """A filter that contradicts itself."""
-
-
 @dataclass(frozen=True, slots=True)
 class EpisodeFilter:
-    """Selects episodes by run, split and outcome; an empty entry, and False, select all. Raises BadFilter.
+    """Selects episodes by run, split and outcome; an empty entry, and False, select all. Raises BadInput.
 
     `where` is an expression over the columns of the table (`expressions.py`).
 
@@ -46,18 +43,18 @@ class EpisodeFilter:
     def __post_init__(self) -> None:
         for name in ("worst", "best"):
             if (count := getattr(self, name)) is not None and count < 1:
-                raise BadFilter(f"--{name} {count}: select 1 episode or more")
+                raise BadInput(f"--{name} {count}: select 1 episode or more")
 
 
 def recordings(places: Sequence[Path]) -> list[Path]:
-    """The recordings at places, which are recordings or folders; each file once. Raises NoEpisodes."""
+    """The recordings at places, which are recordings or folders; each file once. Raises BadInput."""
     files: dict[Path, None] = {}
     for place in places:
         if not place.exists():
-            raise NoEpisodes(f"{place} does not exist; `dextron-bench run --record 3` makes recordings, in runs")
+            raise BadInput(f"{place} does not exist; `dextron-bench run --record 3` makes recordings, in runs")
         place_files = [place] if place.is_file() else [file for file in visible(place, "**/*.rrd") if _is_episode(file)]
         if not place_files:
-            raise NoEpisodes(f"no recordings at {place}; make some with `dextron-bench run --record 3`")
+            raise BadInput(f"no recordings at {place}; make some with `dextron-bench run --record 3`")
         files |= dict.fromkeys(place_files)
     return list(files)
 
@@ -77,12 +74,12 @@ def hashes(files: Sequence[Path]) -> dict[Path, str]:
 
 
 def select(table: pd.DataFrame, episode_filter: EpisodeFilter) -> tuple[pd.DataFrame, int]:
-    """The episodes that a filter selects, and the number that pass it; raises NoEpisodes, BadExpression."""
+    """The episodes that a filter selects, and the number that pass it; raises BadInput, BadExpression."""
     passing = matching(table, episode_filter)
     played = passing[passing["steps"] > 0]
     if played.empty:
         unplayed = "; the agent failed before their first step" if len(passing) else ""
-        raise NoEpisodes(f"{len(passing)} of {len(table)} episodes match the filter{unplayed}")
+        raise BadInput(f"{len(passing)} of {len(table)} episodes match the filter{unplayed}")
     if episode_filter.worst is None and episode_filter.best is None:
         return played.head(LIMIT), len(played)
     return best_and_worst(played, episode_filter), len(played)
@@ -99,7 +96,7 @@ def best_and_worst(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.Dat
 
 
 def matching(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.DataFrame:
-    """All episodes that pass a filter, without its limit on their number; raises NoEpisodes, BadExpression."""
+    """All episodes that pass a filter, without its limit on their number; raises BadInput, BadExpression."""
     table = expressions.filtered(table, episode_filter.where, COLUMNS)
     for name in ("method", "reaches", "split", "seed", "row", "cause"):
         if values := getattr(episode_filter, name):
@@ -109,8 +106,8 @@ def matching(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.DataFrame
 
 
 def _check(table: pd.DataFrame, name: str, values: Sequence[str | int]) -> None:
-    """Raises NoEpisodes, with the valid values, for a value that no episode has."""
+    """Raises BadInput, with the valid values, for a value that no episode has."""
     valid = list(CAUSES) if name == "cause" else sorted(table[name].unique())
     if unknown := [value for value in values if value not in valid]:
         choice = f"{valid[0]} to {valid[-1]}" if name == "row" else ", ".join(map(str, valid))
-        raise NoEpisodes(f"no episode has {name} {unknown[0]!r}; choose from {choice}")
+        raise BadInput(f"no episode has {name} {unknown[0]!r}; choose from {choice}")

@@ -14,6 +14,7 @@ from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import progress_bar
 from dextron_bench.cli.support.pieces import PieceFlags, Pieces
 from dextron_bench.cli.support.standings import print_beside_published
+from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
@@ -73,6 +74,6 @@ class Eval:
         if self.weights is None:
             return with_shipped_weights(run, self.seed)
         if len(self.seed) > 1:
-            raise method_weights.BadWeights("a file holds the weights of one seed: give one --seed, or none")
+            raise BadInput("a file holds the weights of one seed: give one --seed, or none")
         seed = self.seed[0] if self.seed else method_weights.seed_of(self.weights)
         return [run.with_weights(seed, self.weights)]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
-from dextron_bench.cli.support.rows import NoRows
+from dextron_bench.errors import BadInput
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Figures:
         from dextron_bench.recording import stills
 
         if min(self.rows, self.settings) < 1:
-            raise NoRows("--rows and --settings must be 1 or more")
+            raise BadInput("--rows and --settings must be 1 or more")
         self.into.mkdir(parents=True, exist_ok=True)
         for file in (*self._reaches(), *self._learning(), *self._success(), *stills.write_pictures(self.into)):
             print(file)

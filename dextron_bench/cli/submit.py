@@ -14,6 +14,7 @@ from dextron_bench.cli.support.method_flags import changed_settings
 from dextron_bench.cli.support.output import progress_bar
 from dextron_bench.cli.support.pieces import PieceFlags, Pieces
 from dextron_bench.cli.support.standings import print_rows
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.declaration import Declaration
 
 if TYPE_CHECKING:
@@ -66,7 +67,6 @@ class Submit:
     method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
-        from dextron_bench.cluster.tasks import BadCluster
         from dextron_bench.methods import specs
         from dextron_bench.methods.isolation.isolated_agent import Limits
         from dextron_bench.runs import run_files
@@ -81,7 +81,7 @@ class Submit:
 
         def works() -> list[EvaluationJob]:
             if self.pieces.cluster and specs.parse(entry.spec).kind == "command":
-                raise BadCluster(f"{entry.spec} lies on this machine alone: use --share on machines that have it")
+                raise BadInput(f"{entry.spec} lies on this machine alone: use --share on machines that have it")
             return playing.prepare_all(entry, self.runs, self.record, limits, self.threads)
 
         if self.pieces.play(works, self.runs, self.threads, self.quiet):

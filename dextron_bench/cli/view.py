@@ -14,6 +14,7 @@ from dextron_bench.cli.support.episode_flags import EpisodeFlags
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import print_table, print_warning, progress_bar
 from dextron_bench.cli.support.serving import serve
+from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,10 +98,10 @@ class View(EpisodeFlags):
         return self._select(places, episode_filter)
 
     def _side_by_side(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> Path:
-        from dextron_bench.catalogue import selection, side_by_side
+        from dextron_bench.catalogue import side_by_side
 
         if len(places) != 2:
-            raise selection.BadFilter(f"--diff takes two places, recordings or runs; there are {len(self.place)}")
+            raise BadInput(f"--diff takes two places, recordings or runs; there are {len(self.place)}")
         first, second = places
         return side_by_side.side_by_side(first, second, episode_filter, self.runs)
 
@@ -113,10 +114,9 @@ class View(EpisodeFlags):
             serve(server)
 
     def _live(self) -> int:
-        from dextron_bench.catalogue.selection import BadFilter
 
         if self.web:
-            raise BadFilter("--live shows its window on a screen; `run --tracker tensorboard` follows in the browser")
+            raise BadInput("--live shows its window on a screen; `run --tracker tensorboard` follows in the browser")
         return self._follow_training() if self.place else self._play_live()
 
     def _follow_training(self) -> int:
@@ -156,10 +156,9 @@ class View(EpisodeFlags):
         return DONE
 
     def _check_live(self) -> None:
-        from dextron_bench.catalogue.selection import BadFilter
 
         if len(self.method) != 1:
-            raise BadFilter("--live takes the folder of a training, or one --method, such as rlil or exp")
+            raise BadInput("--live takes the folder of a training, or one --method, such as rlil or exp")
 
     def _select(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
         """The recordings of selected episodes; prints a table of them unless --print is set."""
@@ -178,14 +177,14 @@ class View(EpisodeFlags):
 
 
 def _undamaged(files: Sequence[Path]) -> list[Path]:
-    """The undamaged recordings; prints a line on stderr for each damaged one. Raises NoEpisodes if all are damaged."""
+    """The undamaged recordings; prints a line on stderr for each damaged one. Raises BadInput if all are damaged."""
     from dextron_bench import recording
-    from dextron_bench.catalogue import episodes, selection
+    from dextron_bench.catalogue import selection
 
     summaries = list(recording.summarise(files, whole=True, hashes=selection.hashes(files)))
     damaged = [f"{summary.file}: {summary.damage}" for summary in summaries if summary.damage]
     if len(damaged) == len(summaries):
-        raise episodes.NoEpisodes("; ".join(damaged))
+        raise BadInput("; ".join(damaged))
     for fault in damaged:
         print_warning(fault)
     return [summary.file for summary in summaries if not summary.damage]

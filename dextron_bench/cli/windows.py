@@ -11,7 +11,7 @@ import tyro
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_table, progress_bar
-from dextron_bench.cli.support.rows import NoRows
+from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -54,7 +54,7 @@ class Windows:
         from dextron_bench.splits.loading import load_split
 
         if self.rows < 1:
-            raise NoRows(f"--rows must be 1 or more, not {self.rows}")
+            raise BadInput(f"--rows must be 1 or more, not {self.rows}")
         pictures.check_format(self.into)
         split, agents = load_split(self.reaches, self.split), dict(map(self._agent, self.agents))
         with progress_bar("windows", self.quiet) as progress:
@@ -96,11 +96,11 @@ class Windows:
 
 
 def _failed(choices: Sequence[Sequence[Choice]]) -> Sequence[int]:
-    """The rows in which some agent failed; raises NoRows if there is none."""
+    """The rows in which some agent failed; raises BadInput if there is none."""
     rows = list(zip(*choices, strict=True))
     failed = [row for row, chosen in enumerate(rows) if not all(choice.success for choice in chosen)]
     if not failed:
-        raise NoRows(f"no agent failed in any of the {len(rows)} settings; leave out --failed, or give more --rows")
+        raise BadInput(f"no agent failed in any of the {len(rows)} settings; leave out --failed, or give more --rows")
     return failed
 
 

@@ -17,7 +17,8 @@ from types import TracebackType
 from typing import Any
 
 from dextron_bench.cluster import inputs, installation, worker
-from dextron_bench.cluster.tasks import BadCluster, OtherVersion, PieceFailed, Reply, Task, write_files
+from dextron_bench.cluster.tasks import OtherVersion, PieceFailed, Reply, Task, write_files
+from dextron_bench.errors import BadInput, DextronError
 from dextron_bench.storage.progress import Progress, no_progress
 
 LOCAL, AUTO, REMOTE = "local", "auto", "ray://"
@@ -42,11 +43,11 @@ Done = Callable[[Task], bool]  # Receives a task whose files are written; if Tru
 
 
 def check_flag(text: str) -> None:
-    """Raises BadCluster if a text names no cluster, or if Ray is not installed; imports nothing."""
+    """Raises BadInput if a text names no cluster, or if Ray is not installed; imports nothing."""
     if text not in (LOCAL, AUTO) and not text.startswith(REMOTE):
-        raise BadCluster(f"--cluster {text!r} is none of local, auto and ray://HOST:PORT")
+        raise BadInput(f"--cluster {text!r} is none of local, auto and ray://HOST:PORT")
     if importlib.util.find_spec("ray") is None:
-        raise BadCluster("--cluster needs Ray: `pip install 'dextron-bench[cluster]'`")
+        raise BadInput("--cluster needs Ray: `pip install 'dextron-bench[cluster]'`")
 
 
 class RayCluster:
@@ -91,7 +92,7 @@ class RayCluster:
         """Does all tasks that `next_task` returns, until it returns None while none is under way.
 
         `waiting` is called each PERIOD. The tasks of a node that is lost are done again. If the work ends early, by
-        `done` or an error, the tasks under way are cancelled. Raises PieceFailed, OtherVersion, BadCluster,
+        `done` or an error, the tasks under way are cancelled. Raises PieceFailed, OtherVersion, BadInput,
         DamagedFile.
         """
         again: deque[Task] = deque()
@@ -134,7 +135,7 @@ class RayCluster:
         return bool(self._under_way)
 
     def _connect(self) -> None:
-        """Starts Ray on this machine, or connects to a cluster; raises BadCluster."""
+        """Starts Ray on this machine, or connects to a cluster; raises BadInput."""
         quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "CRITICAL"}
         try:
             if self._address == LOCAL:
@@ -143,13 +144,13 @@ class RayCluster:
                 self._ray.init(self._address, **quiet)
         except ConnectionError as error:
             why = START if self._address == AUTO else " ".join(str(error).split())
-            raise BadCluster(f"no cluster answers to --cluster {self._address}: {why}") from error
+            raise BadInput(f"no cluster answers to --cluster {self._address}: {why}") from error
 
     def _room(self) -> int:
-        """How many tasks to have in the cluster at once; raises BadCluster if no node has the processors of a task."""
+        """How many tasks to have in the cluster at once; raises BadInput if no node has the processors of a task."""
         processors = [node["Resources"].get("CPU", 0.0) for node in self._ray.nodes() if node["Alive"]]
         if max(processors, default=0.0) < self.threads and sum(processors):
-            raise BadCluster(
+            raise BadInput(
                 f"a task needs {self.threads} processors, and the largest node has {max(processors):.0f}: use a "
                 "smaller --threads"
             )
@@ -203,7 +204,7 @@ class RayCluster:
         return reply
 
 
-class RemoteError(Exception):
+class RemoteError(DextronError):
     """The traceback of an error on a node, as the cause of the driver's error."""
 
 

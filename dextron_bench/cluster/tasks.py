@@ -8,20 +8,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import BadInput, Failed
 from dextron_bench.storage import atomic
 
 RUNS, CACHE = "runs", "cache"  # The places of inputs begin so: the folder of runs, and the one for imported data.
 
 
-class BadCluster(ValueError):
-    """A cluster that does not exist, does not answer, or has no room for a task."""
-
-
-class OtherVersion(ValueError):
+class OtherVersion(BadInput):
     """A node whose code, data or packages differ from the driver's."""
 
 
-class PieceFailed(RuntimeError):
+class PieceFailed(Failed):
     """A piece, by the name of its task, that raised an error on its node, which another try would only repeat."""
 
     def __init__(self, task: str, why: str, node: str = "") -> None:

@@ -16,7 +16,8 @@ from typing import Any
 from dextron_bench.cluster import inputs
 from dextron_bench.cluster.pieces import check_expected
 from dextron_bench.cluster.ray_cluster import RayCluster
-from dextron_bench.cluster.tasks import BadCluster, Task
+from dextron_bench.cluster.tasks import Task
+from dextron_bench.errors import BadInput
 from dextron_bench.methods import registry
 from dextron_bench.runs import plans
 from dextron_bench.storage import folder_config, provenance
@@ -71,10 +72,10 @@ def train(
 ) -> None:
     """Trains what groups of runs need, groups that differ only in their seeds; skips seeds that are trained.
 
-    `progress` receives epochs. Raises BadCluster, Busy, FolderMismatch and the errors of `RayCluster.run`.
+    `progress` receives epochs. Raises BadInput, Busy, BadInput and the errors of `RayCluster.run`.
     """
     if device == "auto":
-        raise BadCluster("nodes may differ in their devices: give --device cpu or --device cuda, not auto")
+        raise BadInput("nodes may differ in their devices: give --device cpu or --device cuda, not auto")
     trainings = _trainings(groups, runs, cluster.threads, device)
     waiting, running = deque(trainings.items()), dict(trainings)
     total = sum(training.job.learner.epochs for training in trainings.values())

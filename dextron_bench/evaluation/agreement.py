@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
 from dextron_bench.reaches import setting
@@ -20,26 +21,22 @@ UNIFORM = "uniform"  # The stratum that is drawn as the search draws; most of it
 HARD = f"all but {UNIFORM}"
 
 
-class BadOutcomes(ValueError):
-    """A file that is not a table of outcomes; the message names the file and the reason."""
-
-
 def read(file: Path) -> pd.DataFrame:
-    """The outcomes in a CSV file, with the columns `reach`, `stratum` and NUMBERS; raises BadOutcomes, OSError."""
+    """The outcomes in a CSV file, with the columns `reach`, `stratum` and NUMBERS; raises BadInput, OSError."""
     try:
         table = pd.read_csv(file, dtype=str)
     except ValueError as error:  # Also a file that is empty or not UTF-8.
-        raise BadOutcomes(f"{file}: is not a CSV file ({error})") from error
+        raise BadInput(f"{file}: is not a CSV file ({error})") from error
     missing = [name for name in ("reach", "stratum", *NUMBERS) if name not in table]
     if missing:
-        raise BadOutcomes(f"{file}: has no column {missing[0]!r}; outcomes need reach, stratum, {', '.join(NUMBERS)}")
+        raise BadInput(f"{file}: has no column {missing[0]!r}; outcomes need reach, stratum, {', '.join(NUMBERS)}")
     for name in NUMBERS:
         table[name] = table[name].map(_number).astype(float)
     usable = np.isfinite(table[list(NUMBERS)].to_numpy(float)).all(axis=1)
     usable &= table[["reach", "stratum"]].notna().to_numpy().all(axis=1)
     if table.empty or not usable.all():
         where = "has no rows" if table.empty else f"line {np.argmin(usable) + 2}: a value is missing or not a number"
-        raise BadOutcomes(f"{file}: {where}")
+        raise BadInput(f"{file}: {where}")
     return table
 
 
@@ -52,7 +49,7 @@ def _number(text: object) -> float:
 
 
 def play(outcomes: pd.DataFrame, source: setting.Source, progress: Progress = no_progress) -> np.ndarray:
-    """Our returns (rows,), 0 to 20, of the settings and experts of the outcomes. Raises UnknownReach, ReachError."""
+    """Our returns (rows,), 0 to 20, of the settings and experts of the outcomes. Raises UnknownReach, BadInput."""
     experts = zip(outcomes["gain"], outcomes["critical_distance"], strict=True)
     settings = setting.from_frame(outcomes)
     cases = [Case(one, Expert(gain, critical), 0.0) for one, (gain, critical) in zip(settings, experts, strict=True)]

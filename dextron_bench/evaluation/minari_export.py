@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import to_builtins
 
+from dextron_bench.errors import BadInput, MissingPackage
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods.agents import Agent
@@ -34,15 +35,11 @@ NAME = re.compile(r"[\w-]+(/[\w-]+)*-v\d+", re.ASCII)
 CONTRIBUTORS = "the dextron-bench contributors"
 
 
-class MissingMinari(ImportError):
+class MissingMinari(MissingPackage):
     """Minari is not installed; it is an optional dependency."""
 
     def __init__(self) -> None:
         super().__init__("Minari is not installed; `pip install 'minari[arrow]'` installs it")
-
-
-class BadExport(ValueError):
-    """A data set that cannot be written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,16 +66,14 @@ class Export:
 
     def __post_init__(self) -> None:
         if not NAME.fullmatch(self.name):
-            raise BadExport(
-                f"{self.name!r} names no data set; a name ends in a version, as dextron/my-episodes-v0 does"
-            )
+            raise BadInput(f"{self.name!r} names no data set; a name ends in a version, as dextron/my-episodes-v0 does")
         if self.rows < 1 or not self.players:
-            raise BadExport("a data set needs at least one row and one player")
+            raise BadInput("a data set needs at least one row and one player")
 
     def write(self, source: Source, into: Path, threads: int = 0, progress: Progress = no_progress) -> Path:
         """Plays the episodes and stores them below the folder `into`; returns the data set's folder.
 
-        Writes nothing else, and leaves nothing after an error. Raises MissingMinari, BadExport if the data set already
+        Writes nothing else, and leaves nothing after an error. Raises MissingMinari, BadInput if the data set already
         exists or a player fails, AgentError.
         """
         folder = into / self.name
@@ -98,7 +93,7 @@ class Export:
             for place, player in enumerate(self.players):
                 for done, (row, episode) in enumerate(rollout(player.agent, source, rows, threads=threads), 1):
                     if episode.failure:
-                        raise BadExport(f"{player.name} failed in row {row} of {self.split.name!r}: {episode.failure}")
+                        raise BadInput(f"{player.name} failed in row {row} of {self.split.name!r}: {episode.failure}")
                     number = place * len(rows) + row
                     storage.update_episodes([_buffer(number, episode)])
                     yield number, {"player": player.name, "row": row} | _episode_metadata(episode)
@@ -128,9 +123,9 @@ class Export:
 
 @contextmanager
 def _atomic_folder(folder: Path) -> Iterator[Path]:
-    """A temporary folder that becomes `folder` after the block, or is removed after an error; raises BadExport."""
+    """A temporary folder that becomes `folder` after the block, or is removed after an error; raises BadInput."""
     if folder.exists():
-        raise BadExport(f"{folder} already exists; remove it, or choose another --name or --into")
+        raise BadInput(f"{folder} already exists; remove it, or choose another --name or --into")
     part = atomic.temporary(folder.absolute())  # Minari fails on relative paths.
     part.mkdir(parents=True)
     try:

@@ -48,7 +48,7 @@ def replay(
     `rows` is a split or a part of one, whose bottles count and whose track does not, since stored actions are those
     that arrived; or a list of settings.
 
-    Raises SettingError; ValueError for actions of another shape or number; and what `rollout` raises.
+    Raises BadInput; ValueError for actions of another shape or number; and what `rollout` raises.
     """
     rows = rows if isinstance(rows, Rows) else _rows_of(rows)
     sequences = [_sequence(numbers) for numbers in actions]
@@ -58,7 +58,7 @@ def replay(
 
 
 def _rows_of(settings: Sequence[Setting]) -> Rows:
-    """Rows of settings in which no expert acts; raises SettingError."""
+    """Rows of settings in which no expert acts; raises BadInput."""
     return Rows(cases=tuple(Case(checked_setting(setting), UNUSED, 0.0) for setting in settings))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import folder_config, provenance, records, tables
 from dextron_bench.storage.provenance import Provenance
 from dextron_bench.world import model, task
@@ -18,7 +19,7 @@ PROVENANCE = "provenance.json"  # What made the blocks, if shares have worked on
 KEPT = 1.0  # Rows with a sum of rewards above this are kept (paper, II.C).
 
 
-class DamagedBlock(ValueError):
+class DamagedBlock(BadInput):
     """A block of a search that cannot be used; the message names it and says what to do."""
 
     def __init__(self, file: Path, why: object) -> None:
@@ -44,7 +45,7 @@ class Tally:
 
 
 def write_or_check(search: dict[str, Any], folder: Path) -> None:
-    """Writes the search into a new folder; raises FolderMismatch if the folder holds another search."""
+    """Writes the search into a new folder; raises BadInput if the folder holds another search."""
     config = {"search": search, "physics": model.mjcf_hash()}
     folder_config.write_or_check_file(folder / SEARCH, config, "search", "choose another folder, or remove it")
 

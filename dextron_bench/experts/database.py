@@ -13,20 +13,13 @@ import numpy as np
 import pandas as pd
 from msgspec import to_builtins
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import blocks, montecarlo
 from dextron_bench.reaches import setting
 from dextron_bench.storage import atomic, hashing
 from dextron_bench.world import model, task
 
 BANDS = 9  # Equal bands of d_c in the statistics.
-
-
-class OtherPhysics(ValueError):
-    """A database that was searched with other physics: a search finds other outcomes now."""
-
-
-class DamagedDatabase(ValueError):
-    """A database that cannot be read, or whose rows differ from its summary."""
 
 
 def save(
@@ -51,7 +44,7 @@ def save(
 
 
 def load(file: Path) -> pd.DataFrame:
-    """The rows of a database, verified against its summary; raises DamagedDatabase, FileNotFoundError."""
+    """The rows of a database, verified against its summary; raises BadInput, FileNotFoundError."""
     expected = summary(file)["digest"]
     try:
         rows = pd.read_parquet(file)
@@ -59,28 +52,28 @@ def load(file: Path) -> pd.DataFrame:
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, FileNotFoundError) or getattr(error, "errno", None) is not None:  # Of the system.
             raise
-        raise DamagedDatabase(f"expert database {file} is damaged ({error}); make it again with `data mc`") from error
+        raise BadInput(f"expert database {file} is damaged ({error}); make it again with `data mc`") from error
     if actual != expected:
-        raise DamagedDatabase(f"expert database {file} does not match its summary; make it again with `data mc`")
+        raise BadInput(f"expert database {file} does not match its summary; make it again with `data mc`")
     return rows
 
 
 def summary(file: Path) -> dict[str, Any]:
-    """A database's search, counts, statistics and provenance; raises DamagedDatabase, FileNotFoundError."""
+    """A database's search, counts, statistics and provenance; raises BadInput, FileNotFoundError."""
     try:
         about = json.loads(file.with_suffix(".json").read_text(encoding="utf-8"))
     except ValueError as error:
-        raise DamagedDatabase(f"summary of expert database {file} is damaged ({error}); make it again") from error
+        raise BadInput(f"summary of expert database {file} is damaged ({error}); make it again") from error
     if not isinstance(about, dict) or not {"digest", "search", "statistics"} <= set(about):
-        raise DamagedDatabase(f"summary of expert database {file} is incomplete; make it again with `data mc`")
+        raise BadInput(f"summary of expert database {file} is incomplete; make it again with `data mc`")
     return about
 
 
 def check_physics(summary: dict[str, Any]) -> None:
-    """Raises OtherPhysics if the search of a summary was played with other physics than this version's."""
+    """Raises BadInput if the search of a summary was played with other physics than this version's."""
     physics = summary.get("provenance", {}).get("physics", "")
     if physics != model.mjcf_hash():
-        raise OtherPhysics(
+        raise BadInput(
             f"the database was searched with physics {physics[:8] or 'unknown'}, and this version has "
             f"{model.mjcf_hash()[:8]}; search again without --extend"
         )

@@ -12,14 +12,11 @@ from typing import Protocol
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import policies
 from dextron_bench.reaches import setting
 
 SLOTS = 1024  # Episodes at once, with the slots that are reserved for forks.
-
-
-class BadSearch(ValueError):
-    """Settings of a search that are not possible."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +35,7 @@ class Search:
 
     def __post_init__(self) -> None:
         if min(self.experts, self.block) < 1 or self.seed < 0:
-            raise BadSearch("a search needs at least one expert and one setting per block, and a seed of 0 or more")
+            raise BadInput("a search needs at least one expert and one setting per block, and a seed of 0 or more")
 
 
 class Sampler(Protocol):

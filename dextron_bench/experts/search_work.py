@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import blocks, montecarlo, outcomes
 from dextron_bench.experts.blocks import Tally
 from dextron_bench.experts.montecarlo import Search
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
-from dextron_bench.storage import atomic, block_work, folder_config, hashing, provenance, tables
+from dextron_bench.storage import atomic, block_work, hashing, provenance, tables
 from dextron_bench.storage.block_work import BlockWork
 from dextron_bench.storage.pieces import Place, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
@@ -46,7 +47,7 @@ class SearchWork(BlockWork):
     _read: dict[int, Tally] = field(default_factory=dict, init=False, repr=False)  # Tallies of blocks, by number.
 
     def begin(self) -> None:
-        """Writes the search into a new folder; raises FolderMismatch if the folder holds another search."""
+        """Writes the search into a new folder; raises BadInput if the folder holds another search."""
         blocks.write_or_check(asdict(self.search), self.place)
 
     def config_of(self, name: str) -> dict[str, Any]:
@@ -73,7 +74,7 @@ class SearchWork(BlockWork):
 
         Columns: the columns of `montecarlo.draw`, then `score` (sum of rewards) and `length` [control steps]. Blocks of
         shares are checked, and become blocks of the search. Calls `progress` with the number of solved rows, and the
-        goal. Raises FolderMismatch if the folder holds another search, DamagedBlock, and the errors of `stored`.
+        goal. Raises BadInput if the folder holds another search, DamagedBlock, and the errors of `stored`.
         """
         self.begin()
         self._take_pieces()
@@ -92,7 +93,7 @@ class SearchWork(BlockWork):
         """Writes the first `count` blocks again from the `kept` rows of a database, so that the search can continue.
 
         Draws that the database does not hold get a score of 0 and no length. Blocks that exist stay as they are. Raises
-        FolderMismatch if the rows do not belong to this search.
+        BadInput if the rows do not belong to this search.
         """
         self.begin()
         key = ["reach", "gain", "critical"]
@@ -107,9 +108,7 @@ class SearchWork(BlockWork):
             if not self.block_file(number).exists():
                 self._write(number, draws)
         if restored < len(kept):
-            raise folder_config.FolderMismatch(
-                f"row {restored} of the database does not belong to a search with seed {self.search.seed}"
-            )
+            raise BadInput(f"row {restored} of the database does not belong to a search with seed {self.search.seed}")
 
     def _tallies(self, files: dict[int, Path]) -> dict[int, Tally]:
         """The tallies of blocks; each block is read once."""

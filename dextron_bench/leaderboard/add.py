@@ -7,6 +7,7 @@ from pathlib import Path
 
 from msgspec import structs
 
+from dextron_bench.errors import BadInput
 from dextron_bench.leaderboard import build, collect, highlights
 from dextron_bench.methods import registry
 from dextron_bench.runs import run_files
@@ -14,22 +15,21 @@ from dextron_bench.storage import atomic, folders, tables
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle, names
-from dextron_bench.submissions.entry import BadSubmission
 from dextron_bench.submissions.verdict import Verdict
 
 
 def check_name(name: str, reaches: str, board: Path, replace: bool) -> None:
-    """Raises BadSubmission if a submission must not use a name, or if it is on the board and `replace` is False."""
+    """Raises BadInput if a submission must not use a name, or if it is on the board and `replace` is False."""
     if not registry.NAME.fullmatch(name) or len(name) > 64:
-        raise BadSubmission(f"{name!r} is not a valid name: use letters, digits and . _ + -, as in 'my-agent'")
+        raise BadInput(f"{name!r} is not a valid name: use letters, digits and . _ + -, as in 'my-agent'")
     results = board / collect.RESULTS
     rows = {names.appearance(place.name): place for place in visible(results, "*")}
     place = rows.get(names.appearance(name))
     taken = place is not None and (place.name != name or not visible(place, f"*/{bundle.MANIFEST}"))
     if taken or names.imitated(name, registry.installed_methods()):
-        raise BadSubmission(f"{name!r} looks like the name of another row; submit it under another name")
+        raise BadInput(f"{name!r} looks like the name of another row; submit it under another name")
     if place and (place / reaches).exists() and not replace:
-        raise BadSubmission(f"{name!r} on {reaches} reaches is on the board; --replace replaces it")
+        raise BadInput(f"{name!r} on {reaches} reaches is on the board; --replace replaces it")
 
 
 def merge(verdict: Verdict, board: Path, agent: Path) -> list[Path]:
@@ -39,7 +39,7 @@ def merge(verdict: Verdict, board: Path, agent: Path) -> list[Path]:
     are recorded beside the board, from its actions, not from its own recordings.
 
     Results, tables and page change together in one step: whoever reads the board sees it before or after, and if the
-    submission breaks the page, or the process dies, it stays as it was. Raises FolderBusy.
+    submission breaks the page, or the process dies, it stays as it was. Raises Failed.
     """
     with folders.replacing(board) as part:
         manifest, place = verdict.manifest, _put(verdict, part)

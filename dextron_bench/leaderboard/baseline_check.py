@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from msgspec import to_builtins
 
+from dextron_bench.errors import NotFound
 from dextron_bench.evaluation import episode_table
 from dextron_bench.evaluation.results import Result, SplitScores, Training, scores_by_split
 from dextron_bench.evaluation.rollout import rollout
@@ -24,7 +25,7 @@ from dextron_bench.storage.run_folder import RunFolder
 NewAgent = Callable[[], Agent]
 
 
-class NotReproducible(LookupError):
+class NotReproducible(NotFound):
     """A row whose agent cannot be made again."""
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard import readme
 from dextron_bench.leaderboard.collect import RESULTS
@@ -25,14 +26,10 @@ ORIGIN = ("tier", "frames", "demonstrations", "seconds", "hardware", "privileged
 Curves = dict[int, pd.DataFrame]  # By seed; columns epoch, return, success.
 
 
-class OtherPhysics(ValueError):
-    """A published result whose episodes were played with other physics, so that its scores do not compare."""
-
-
 def build(board: Path) -> list[Path]:
     """Writes table (CSV, JSON), README tables, pictures of learning curves and page into a leaderboard's folder.
 
-    The page links to the recordings in the folder beside the leaderboard's. Returns the files; raises OtherPhysics,
+    The page links to the recordings in the folder beside the leaderboard's. Returns the files; raises BadInput,
     DamagedFile, BrokenRecording.
     """
     from dextron_bench.leaderboard import page
@@ -58,11 +55,11 @@ def build(board: Path) -> list[Path]:
 
 
 def _results_of_this_world(runs: Path) -> list[Result]:
-    """The results below a folder; raises OtherPhysics if one was played with other physics than this version's."""
+    """The results below a folder; raises BadInput if one was played with other physics than this version's."""
     results = list(result_files.results(runs))
     for result in results:
         if result.physics != model.mjcf_hash():
-            raise OtherPhysics(
+            raise BadInput(
                 f"{result.method} on {result.reaches} reaches, seed {result.seed}, was played with physics "
                 f"{result.physics[:8] or 'unknown'}, and this version has {model.mjcf_hash()[:8]}; remove it from "
                 f"{runs}, and run it again"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.results import Result, RunConfig, SplitScores
 from dextron_bench.methods import registry, specs, weights
 from dextron_bench.methods.agents import AgentError
@@ -23,16 +24,12 @@ from dextron_bench.world import model
 RESULTS = "results"  # In the leaderboard's folder: a folder of runs without their large files.
 
 
-class NothingToPublish(LookupError):
-    """A folder of runs without a finished one."""
-
-
 def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
     """Copies results and curves of finished runs into the leaderboard's folder, and weights beside their methods.
 
     A run is finished if its result holds all rows of all splits that rank methods. Runs with other physics than this
     version's are left out, and so are others than `only`, if it names labels with a source, such as rl/real, and what
-    a learner played on `val`. Returns the folders of results that were written; raises NothingToPublish, DamagedFile,
+    a learner played on `val`. Returns the folders of results that were written; raises NotFound, DamagedFile,
     UnknownMethod, BadSettings.
     """
     taken = []
@@ -59,7 +56,7 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
             _copy(run.weights, weights.shipped_folder(learner, result.reaches) / file)
         taken.append(copy.path)
     if not taken:
-        raise NothingToPublish(
+        raise NotFound(
             f"no run in {runs} holds all splits that rank methods, with this version's physics; "
             "`dextron-bench run` makes some"
         )

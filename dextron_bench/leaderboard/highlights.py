@@ -12,6 +12,7 @@ from urllib.parse import quote
 import pandas as pd
 
 from dextron_bench.catalogue import episodes, rerecording
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.methods import registry
 from dextron_bench.reaches import sources
@@ -53,7 +54,7 @@ def choose(runs: Path, reaches: Sequence[str], split: str, rows: int, methods: S
     """The episodes to show from the first rows of a split in a folder of runs, with a `name` for each.
 
     Each method, or each of `methods`, is shown on the first of the sources `reaches` that it played, at its lowest
-    seed; exemplars are of any method. Raises NoEpisodes, DamagedFile, MissingData.
+    seed; exemplars are of any method. Raises BadInput, DamagedFile, MissingData.
     """
     table = episodes.read([runs])
     table = table[table["reaches"].isin(reaches) & (table["split"] == split) & (table["row"] < rows)]
@@ -63,9 +64,7 @@ def choose(runs: Path, reaches: Sequence[str], split: str, rows: int, methods: S
     table = table[order == order.groupby(table["method"]).transform("min")]
     table = table[table["seed"] == table.groupby("method")["seed"].transform("min")]
     if table.empty:
-        raise episodes.NoEpisodes(
-            f"no run in {runs} played {split} of {' or '.join(reaches)} reaches; `dextron-bench run` does"
-        )
+        raise BadInput(f"no run in {runs} played {split} of {' or '.join(reaches)} reaches; `dextron-bench run` does")
     by_source = {name: table[table["reaches"] == name] for name in reaches}
     cases = [case for name, group in by_source.items() if len(group) for case in _exemplars(group, name, split)]
     shown = table[table["method"].isin(methods)] if methods else table

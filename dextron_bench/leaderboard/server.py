@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from dextron_bench.errors import NotFound
 from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.leaderboard.highlights import FOLDER
 from dextron_bench.leaderboard.page import FILE
@@ -23,10 +24,6 @@ RECORDING = re.compile(rf"/{FOLDER}/([A-Za-z0-9][A-Za-z0-9._+-]*\.rrd)")
 LINK = re.compile(rf'href="\.\./{FOLDER}/([A-Za-z0-9._+%-]+\.rrd)"')
 CODE = re.compile(rf"/{RESULTS}/([A-Za-z0-9][\w.+-]*)/([a-z]+)/{AGENT}/([A-Za-z0-9][\w.+-]*)", re.ASCII)
 TABLES = {"table.csv": "text/csv; charset=utf-8", "table.json": "application/json"}
-
-
-class NoPage(LookupError):
-    """The leaderboard's folder has no page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +62,9 @@ class Server(LocalServer):
     site: Site
 
     def __init__(self, site: Site, port: int) -> None:
-        """Listens at a port; 0 takes a free one. Raises NoPage, NoPort."""
+        """Listens at a port; 0 takes a free one. Raises NotFound, NoPort."""
         if not (site.board / FILE).is_file():
-            raise NoPage(
+            raise NotFound(
                 f"{site.board} has no {FILE}; `dextron-bench leaderboard build --board {site.board}` builds it"
             )
         super().__init__(site, port)

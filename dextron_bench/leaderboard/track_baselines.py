@@ -19,7 +19,7 @@ from dextron_bench.storage.run_folder import RunFolder
 def splits_to_play(reaches: str, split: str, tracks: Sequence[str] = ()) -> list[Split]:
     """A source's split under each track, or under all tracks that the source has if `tracks` is empty.
 
-    Raises UnknownTrack, UnknownSplit, DamagedSplit.
+    Raises UnknownTrack, UnknownSplit, BadInput.
     """
     if tracks:
         return [load_split(reaches, name) for track in tracks for name in splits_under(reaches, [split], track)]

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 from msgspec.structs import asdict, replace
 
+from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.evaluation.results import Result, scores_by_split
 from dextron_bench.leaderboard import baseline_check, build, collect, fresh_baselines
@@ -29,10 +30,6 @@ from dextron_bench.submissions.manifest import Manifest
 BUILT = (".md", ".csv", ".json", ".html")  # Files that are compared byte by byte; pictures are not.
 
 
-class NothingToVerify(LookupError):
-    """No row to verify."""
-
-
 @dataclass(frozen=True, slots=True)
 class Row:
     """A result on the board."""
@@ -47,7 +44,7 @@ class Row:
 
 
 def rows(board: Path, methods: Sequence[str] = (), reaches: Sequence[str] = ()) -> list[Row]:
-    """The rows of a board for these methods and sources, all if empty; raises NothingToVerify, DamagedFile."""
+    """The rows of a board for these methods and sources, all if empty; raises NotFound, DamagedFile."""
     published = [
         Row(run, result_files.read_result(run.result)) for run in result_files.finished(board / collect.RESULTS)
     ]
@@ -55,7 +52,7 @@ def rows(board: Path, methods: Sequence[str] = (), reaches: Sequence[str] = ()) 
     selected = [row for row in selected if not reaches or row.result.reaches in reaches]
     if not selected:
         names = ", ".join(sorted({row.result.method for row in published})) or "none"
-        raise NothingToVerify(f"{board} has no such rows; its methods: {names}")
+        raise NotFound(f"{board} has no such rows; its methods: {names}")
     return selected
 
 

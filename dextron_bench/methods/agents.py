@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
+from dextron_bench.errors import BadInput, Failed
+
 if TYPE_CHECKING:
     from dextron_bench.experts.policies import Expert
 
@@ -41,11 +43,11 @@ class Privileged(Protocol):
         ...
 
 
-class AgentError(ValueError):
+class AgentError(BadInput):
     """The agent's code raised an exception, or its actions have a wrong shape or type."""
 
 
-class AgentCrashed(RuntimeError):
+class AgentCrashed(Failed):
     """Raised in `act` by an agent that can start again: the current episodes fail, and the others are still played."""
 
 

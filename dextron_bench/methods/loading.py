@@ -14,13 +14,14 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from dextron_bench.errors import NotFound
 from dextron_bench.methods.specs import AgentSpec
 
 GROUP = "dextron_bench.methods"  # Entry points of installed methods.
 PREFIX = "dextron_entrant_"  # Begins the names of modules that are loaded from files.
 
 
-class UnknownMethod(KeyError):
+class UnknownMethod(NotFound):
     """A method that does not exist, or a class that is not a method."""
 
     def __str__(self) -> str:

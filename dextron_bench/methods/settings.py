@@ -10,6 +10,7 @@ from dataclasses import MISSING, Field, asdict, field, fields, is_dataclass, mak
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import hashing
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")  # A run's folder has the name of its method.
@@ -17,7 +18,7 @@ PLAIN = (bool, int, float, str, tuple, type(None))  # Types of defaults; a param
 LONGEST_VALUE = 24  # Characters of a setting's value in a label.
 
 
-class BadSettings(ValueError):
+class BadSettings(BadInput):
     """Settings that a method does not have, or refuses."""
 
 

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from dextron_bench.errors import BadInput
+
 Kind = Literal["method", "module", "file", "policy", "command"]
 
 COMMAND = "exec:"  # A command begins with this.
@@ -23,7 +25,7 @@ PYTHON = ".py"
 POLICIES = (".pt", ".onnx")  # TorchScript and ONNX.
 
 
-class BadSpec(ValueError):
+class BadSpec(BadInput):
     """A text that names no agent; the message says what to write instead."""
 
 

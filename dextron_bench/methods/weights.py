@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.methods import registry
 from dextron_bench.methods.agents import Agent, AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, PolicyTransfer
@@ -20,12 +21,8 @@ SUFFIX = ".safetensors"
 METADATA = ("label", "reaches", "seeds", "epochs", "best_epoch", "frames")  # What a result copies from its weights.
 
 
-class MissingWeights(LookupError):
+class MissingWeights(NotFound):
     """Weights that do not ship."""
-
-
-class BadWeights(ValueError):
-    """A file of weights that does not fit its method."""
 
 
 def shipped_folder(learner: Learner, reaches: str) -> Path:
@@ -68,21 +65,21 @@ def seed_of(file: Path) -> int:
 
 
 def load_agent(learner: Learner, file: Path) -> Agent:
-    """The agent of a file's weights, tried on one state; raises BadWeights, BadTensors, OSError."""
+    """The agent of a file's weights, tried on one state; raises BadInput, BadTensors, OSError."""
     return load_agents(learner, file)()
 
 
 def load_agents(learner: Learner, file: Path) -> Callable[[], Agent]:
     """Makes agents of a file's weights, which are read once and tried on one state.
 
-    Raises BadWeights, BadTensors, OSError.
+    Raises BadInput, BadTensors, OSError.
     """
     arrays = tensors.read(file)
     label = tensors.read_about(file).get("label", learner.label)
     if label != learner.label:
-        raise BadWeights(f"{file} holds weights of {label!r}, not of {learner.label!r}")
+        raise BadInput(f"{file} holds weights of {label!r}, not of {learner.label!r}")
     if bad := [name for name, array in arrays.items() if not np.isfinite(array).all()]:
-        raise BadWeights(f"{file} holds numbers in {bad[0]!r} that are not finite")
+        raise BadInput(f"{file} holds numbers in {bad[0]!r} that are not finite")
     try:
         with as_agent_error("policy()"):
             agent = learner.policy(arrays)
@@ -90,33 +87,33 @@ def load_agents(learner: Learner, file: Path) -> Callable[[], Agent]:
             shape = np.shape(agent.act(np.tile(_state_at_rest(), (1, 1))))
     except AgentError as error:
         cause = error.__cause__
-        raise BadWeights(
+        raise BadInput(
             f"{file} holds no weights that fit {learner.label!r} ({type(cause).__name__}: {cause})"
         ) from error
     if shape != (1, 1):
-        raise BadWeights(f"{file} holds no weights that fit {learner.label!r}: actions of shape {shape} for one state")
+        raise BadInput(f"{file} holds no weights that fit {learner.label!r}: actions of shape {shape} for one state")
     return lambda: learner.policy(arrays)
 
 
 def load_agent_from_file(file: Path) -> Agent:
-    """The agent of a file that names its own method; raises BadWeights, BadSettings, BadTensors, OSError."""
+    """The agent of a file that names its own method; raises BadInput, BadSettings, BadTensors, OSError."""
     method, settings = maker_of(file)
     learner = registry.create(method, settings)
     if not isinstance(learner, Learner):
-        raise BadWeights(f"{file} says it holds weights of {method!r}, which has none")
+        raise BadInput(f"{file} says it holds weights of {method!r}, which has none")
     return load_agent(learner, file)
 
 
 def maker_of(file: Path) -> tuple[str, dict[str, Any]]:
-    """The method and the settings that a file of weights names; raises BadWeights, BadTensors, OSError.
+    """The method and the settings that a file of weights names; raises BadInput, BadTensors, OSError.
 
     The method must be installed: a file may come from a stranger, so its metadata never makes other code run.
     """
     header = tensors.read_about(file)
     if "method" not in header or not isinstance(header.get("settings"), dict):
-        raise BadWeights(f"{file} does not say which method's weights it holds")
+        raise BadInput(f"{file} does not say which method's weights it holds")
     if header["method"] not in registry.installed_methods():
-        raise BadWeights(
+        raise BadInput(
             f"{file} says it holds weights of {header['method']!r}, which is not installed; a file of weights never "
             f"imports code: choose from {', '.join(registry.installed_methods())}, or register it (CONTRIBUTING.md)"
         )

@@ -12,6 +12,7 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from dextron_bench.errors import Failed
 from dextron_bench.processes import limited_start, programs
 from dextron_bench.processes.limited_start import READY
 
@@ -29,7 +30,7 @@ START = 600.0  # [s] in which a process must import what it needs, also from a s
 WORDS = 30  # The last words of the process's errors that a message has.
 
 
-class NotStarted(RuntimeError):
+class NotStarted(Failed):
     """A process that has ended before it could read anything: the machine lacks something, and no file is at fault."""
 
     def __init__(self, errors: str) -> None:

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches import rotation
 from dextron_bench.reaches.timing import CONTROL_STEP
 
@@ -23,10 +24,6 @@ PALM_AHEAD = np.array([0.0, 0.015, 0.0])  # [m] palm origin in the carrier's fra
 PALM_CENTRE = np.array([0.0, 0.09, 0.03])  # [m] palm centre in the palm's frame.
 MIN_GAP = 0.002  # [s] a sample that follows another sooner than this is the same sample, sent twice.
 DECIMALS = 9  # Poses are rounded to a nanometre, so that every processor follows the same path.
-
-
-class ReachError(ValueError):
-    """A reach cannot be used; the message names the reach and the reason."""
 
 
 @dataclass(frozen=True)
@@ -120,11 +117,11 @@ def palm_centre(positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
 def path(reach: Reach, offset_x: float, offset_y: float, duration_noise: float) -> Path:
     """The path of one setting: resampled, scaled in time, centred on the bottle, and shifted by the offsets [m].
 
-    Raises ReachError if the noise makes the reach faster than the recording.
+    Raises BadInput if the noise makes the reach faster than the recording.
     """
     duration = float(scaled_duration(reach.duration, duration_noise))
     if duration < reach.duration:
-        raise ReachError(
+        raise BadInput(
             f"duration noise {duration_noise:.3f} makes reach {reach.name} last {duration:.2f} s, "
             f"less than the recorded {reach.duration:.2f} s; use a larger noise"
         )

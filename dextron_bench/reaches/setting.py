@@ -11,21 +11,18 @@ from typing import Any, Protocol
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.reaches.reach import Path, Reach, path, scaled_duration
 
 OFFSET = 0.06  # [m] offsets are uniform in [-OFFSET, OFFSET] (table I).
 LIMITS = {"offset_x": 1.0, "offset_y": 1.0, "duration_noise": 10.0}  # Largest sizes [m, m, standard deviations].
 
 
-class SettingError(ValueError):
-    """A value is not a setting; the message names the value and the valid ones."""
-
-
 @dataclass(frozen=True, slots=True)
 class Setting:
     """Everything random about one episode: the reach, the offset of its grasp from the bottle, its duration noise.
 
-    Raises SettingError unless the reach is a name and every number lies within LIMITS. No draw reaches these limits:
+    Raises BadInput unless the reach is a name and every number lies within LIMITS. No draw reaches these limits:
     a noise of 10 makes a reach 8 s longer, and an episode lasts at most 10 s.
     """
 
@@ -36,19 +33,19 @@ class Setting:
 
     def __post_init__(self) -> None:
         if not isinstance(self.reach, str):
-            raise SettingError(f"the reach of a setting must be a name; got {self.reach!r}")
+            raise BadInput(f"the reach of a setting must be a name; got {self.reach!r}")
         for name, limit in LIMITS.items():
             value = getattr(self, name)
             if not isinstance(value, numbers.Real) or not math.fabs(value) <= limit:  # This form also refuses NaN.
-                raise SettingError(f"{name} of a setting must be a number in [-{limit:g}, {limit:g}]; got {value!r}")
+                raise BadInput(f"{name} of a setting must be a number in [-{limit:g}, {limit:g}]; got {value!r}")
 
 
 def checked_setting(value: object) -> Setting:
-    """The value, if it is a setting, or the setting of a mapping with its fields; raises SettingError."""
+    """The value, if it is a setting, or the setting of a mapping with its fields; raises BadInput."""
     if isinstance(value, Mapping) and set(value) == {field.name for field in fields(Setting)}:
         return Setting(**value)
     if not isinstance(value, Setting):
-        raise SettingError(f"a setting must be a dextron_bench Setting; got {value!r}")
+        raise BadInput(f"a setting must be a dextron_bench Setting; got {value!r}")
     return value
 
 
@@ -57,7 +54,7 @@ def plain(setting: Setting) -> dict[str, Any]:
     return {name: value if isinstance(value, str) else float(value) for name, value in asdict(setting).items()}
 
 
-class UnknownReach(KeyError):
+class UnknownReach(NotFound):
     """The source has no reach of that name; the message gives examples of its names."""
 
     def __init__(self, name: str, source: str, names: Sequence[str]) -> None:
@@ -78,7 +75,7 @@ class Source(Protocol):
         ...
 
     def path(self, setting: Setting) -> Path:
-        """The path that the hand follows in that setting. Raises UnknownReach or ReachError."""
+        """The path that the hand follows in that setting. Raises UnknownReach or BadInput."""
         ...
 
     def stratum(self, reach: str) -> Stratum:
@@ -125,7 +122,7 @@ class ReachSource:
                 return Setting(name, float(offset_x), float(offset_y), noise)
 
     def path(self, setting: Setting) -> Path:
-        """The scaled, centred and shifted path of a setting. Raises UnknownReach or ReachError."""
+        """The scaled, centred and shifted path of a setting. Raises UnknownReach or BadInput."""
         return path(self.reach(setting.reach), setting.offset_x, setting.offset_y, setting.duration_noise)
 
     def stratum(self, reach: str) -> Stratum:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
+from dextron_bench.errors import NotFound
+
 if TYPE_CHECKING:
     from dextron_bench.reaches.setting import Source
 
@@ -16,7 +18,7 @@ SourceName = Literal["real", "synthetic", "minjerk"]
 RankedSource = Literal["real", "synthetic"]  # The sources that take submissions; `minjerk` has one expert only.
 
 
-class UnknownSource(KeyError):
+class UnknownSource(NotFound):
     """A source of reaches that does not exist."""
 
     def __init__(self, name: str) -> None:

@@ -5,19 +5,19 @@ This is the only package that imports Rerun.
 
 from dextron_bench.recording.episode_file import BrokenRecording, Recording, Value, read, write
 from dextron_bench.recording.live_view import LiveView, open_live_viewer
-from dextron_bench.recording.pair import UnequalSettings, write_pair
+from dextron_bench.recording.pair import write_pair
 from dextron_bench.recording.rrd_file import UnwritableRecording
-from dextron_bench.recording.summaries import ReaderError, Summary, read_safely, read_screened, screen, summarise
+from dextron_bench.recording.summaries import Summary, read_safely, read_screened, screen, summarise
 from dextron_bench.recording.viewer import ViewerError, require_screen, screenshots, view
 from dextron_bench.recording.web_viewer import web_viewer_files
 
 __all__ = [
+    "BadInput",
     "BrokenRecording",
+    "Failed",
     "LiveView",
-    "ReaderError",
     "Recording",
     "Summary",
-    "UnequalSettings",
     "UnwritableRecording",
     "Value",
     "ViewerError",

@@ -17,6 +17,7 @@ import pyarrow as pa
 import rerun as rr
 from rerun.chunk import Chunk
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.phases import phases
 from dextron_bench.evaluation.predictions import StepPredictions
@@ -41,7 +42,7 @@ class Recording:
     properties: dict[str, Value]
 
 
-class BrokenRecording(ValueError):
+class BrokenRecording(BadInput):
     """A file is damaged, incomplete, not readable here, or no recording of this project."""
 
     def __init__(self, file: Path, fault: str) -> None:

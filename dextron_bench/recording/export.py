@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.recording import film, summaries
 from dextron_bench.recording.film_overlay import SMALLEST, Overlay
@@ -18,7 +19,7 @@ FILMS = {".mp4": film.mp4, ".gif": film.gif}
 TABLES = (".csv", ".parquet")
 
 
-class UnknownSuffix(ValueError):
+class UnknownSuffix(BadInput):
     """No export format has the suffix of the file name."""
 
     def __init__(self, file: Path) -> None:
@@ -28,8 +29,8 @@ class UnknownSuffix(ValueError):
 def export(source: Path, into: Path, style: film.FilmStyle, progress: Progress = no_progress) -> None:
     """Writes the episode of a recording to `into` atomically, in the format that the file's suffix names.
 
-    `style` is for films; `progress` receives numbers of frames. Raises UnknownSuffix, BrokenRecording, ReaderError,
-    NoGraphics, NoEncoder, OSError.
+    `style` is for films; `progress` receives numbers of frames. Raises UnknownSuffix, BrokenRecording, Failed,
+    NoGraphics, Failed, OSError.
     """
     suffix = into.suffix.lower()
     if suffix not in (*FILMS, *TABLES):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from dextron_bench.errors import BadInput, Failed
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.world import model, task
 from dextron_bench.world.rendering import renderer
@@ -31,19 +32,11 @@ def undrawn(frame: np.ndarray, index: int) -> np.ndarray:
     return frame
 
 
-class BadFilmStyle(ValueError):
-    """A film cannot have this size or speed."""
-
-
-class NoEncoder(RuntimeError):
-    """PyAV is not installed, so MP4 cannot be written."""
-
-
 @dataclass(frozen=True, slots=True)
 class FilmStyle:
     """Size [pixels], camera and speed of a film; at speed 1 it plays in real time.
 
-    With `overlay`, numbers of the episode stand in the picture. Raises BadFilmStyle, UnknownCamera.
+    With `overlay`, numbers of the episode stand in the picture. Raises BadInput, UnknownCamera.
     """
 
     width: int = 640
@@ -55,11 +48,9 @@ class FilmStyle:
     def __post_init__(self) -> None:
         for name, size in (("width", self.width), ("height", self.height)):
             if size % 2 or not SIZES[0] <= size <= SIZES[1]:
-                raise BadFilmStyle(f"{name} {size}: choose an even number of pixels from {SIZES[0]} to {SIZES[1]}")
+                raise BadInput(f"{name} {size}: choose an even number of pixels from {SIZES[0]} to {SIZES[1]}")
         if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
-            raise BadFilmStyle(
-                f"speed {self.speed:g}: choose a factor from {SPEEDS[0]:g} to {SPEEDS[1]:g}; 1 is real time"
-            )
+            raise BadInput(f"speed {self.speed:g}: choose a factor from {SPEEDS[0]:g} to {SPEEDS[1]:g}; 1 is real time")
         if self.camera not in (*renderer.CAMERAS, FOLLOW):
             raise renderer.UnknownCamera(self.camera, FOLLOW)
 
@@ -84,7 +75,7 @@ def shown_steps(count: int, rate: float, speed: float) -> tuple[list[int], float
 def mp4(
     file: Path, states: np.ndarray, style: FilmStyle, progress: Progress = no_progress, draw: Draw = undrawn
 ) -> None:
-    """Writes states (T, 48) as H.264 in MP4, whatever the file's suffix; raises NoEncoder, NoGraphics.
+    """Writes states (T, 48) as H.264 in MP4, whatever the file's suffix; raises Failed, NoGraphics.
 
     `draw` gets each frame with the index of its state, and returns the frame to write.
     """
@@ -135,5 +126,5 @@ def _encoder() -> Any:
     try:
         import av
     except ImportError as error:
-        raise NoEncoder("MP4 needs PyAV: `pip install av`; or write a .gif") from error
+        raise Failed("MP4 needs PyAV: `pip install av`; or write a .gif") from error
     return av

@@ -9,6 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk
 
+from dextron_bench.errors import BadInput
 from dextron_bench.recording import blueprint, phase_lane, rrd_file, rrd_format, scene
 from dextron_bench.recording.episode_file import Recording
 from dextron_bench.recording.summaries import PAIR, read_safely
@@ -23,18 +24,14 @@ PLOTS = {  # Title of each plot, its entities on each side, and the range of its
 SHARED = ("threshold", "lifted")  # Lines that are equal on both sides; only one of each is drawn.
 
 
-class UnequalSettings(ValueError):
-    """Two recordings have different settings."""
-
-
 def write_pair(file: Path, first: Path, second: Path) -> Path:
     """Writes two recordings of the same setting into one file for the viewer; returns the file.
 
-    `read` cannot read it. Raises BrokenRecording, ReaderError, UnequalSettings, UnwritableRecording.
+    `read` cannot read it. Raises BrokenRecording, Failed, BadInput, UnwritableRecording.
     """
     recordings = [read_safely(source) for source in (first, second)]
     if recordings[0].episode.setting != recordings[1].episode.setting:
-        raise UnequalSettings(
+        raise BadInput(
             f"{first} and {second} have different settings; take two of the same row of the same split, as in "
             "`dextron-bench view --diff runs/bc/synthetic/seed0/recordings/test-0000.rrd "
             "runs/rl/synthetic/seed0/recordings/test-0000.rrd`"

@@ -19,6 +19,7 @@ from rerun_bindings import (
     send_blueprint,
 )
 
+from dextron_bench.errors import DextronError
 from dextron_bench.recording.rrd_format import RrdFormat
 from dextron_bench.storage import atomic
 
@@ -27,7 +28,7 @@ PLAIN, PAIRS = f"{APPLICATION}-plain", f"{APPLICATION}-pairs"  # The viewer has 
 APPLICATIONS = APPLICATION, PLAIN, PAIRS
 
 
-class UnwritableRecording(OSError):
+class UnwritableRecording(DextronError, OSError):
     """A recording cannot be written; the file is unchanged."""
 
     def __init__(self, file: Path, reason: object) -> None:

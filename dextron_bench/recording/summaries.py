@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import Failed
 from dextron_bench.processes import limited_process
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.recording import reader_process, rrd_format
@@ -19,10 +20,6 @@ NEEDED = (*Setting.__slots__, *ENDS, "steps", "episode_return", "outcome")  # Pr
 PAIR = "pair"  # Property of a file with two episodes, which is only for the viewer.
 MEMORY = 2 * limited_process.GIBIBYTE  # [bytes] of address space. With one flipped bit Rerun 0.41 asked for 23 GB.
 START, SECONDS = 60.0, 10.0  # [s] for all files and for each file.
-
-
-class ReaderError(RuntimeError):
-    """The process that reads recordings cannot start; no recording is at fault."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +36,7 @@ class Summary:
 
 
 def summarise(files: Iterable[Path], whole: bool = False, hashes: Mapping[Path, str] = {}) -> Iterator[Summary]:
-    """The summary of each file, in order. Summaries report damage; only ReaderError is raised.
+    """The summary of each file, in order. Summaries report damage; only Failed is raised.
 
     By default only the properties are read, so changes of other values are not noticed. With `whole` all of a file is
     read and compared with its digest, and with its SHA-256 if that is in `hashes`.
@@ -49,14 +46,14 @@ def summarise(files: Iterable[Path], whole: bool = False, hashes: Mapping[Path, 
 
 
 def screen(files: Iterable[Path]) -> Iterator[Summary]:
-    """Summaries of files from others: a separate process decodes all of each file. Raises ReaderError."""
+    """Summaries of files from others: a separate process decodes all of each file. Raises Failed."""
     return _summaries(files, whole=True)
 
 
 def read_safely(file: Path) -> Recording:
     """The episode in a file that may be damaged: a separate process decodes it first.
 
-    Raises BrokenRecording, ReaderError.
+    Raises BrokenRecording, Failed.
     """
     return read_screened(next(screen([file])))
 
@@ -96,7 +93,7 @@ def _describe(files: Sequence[tuple[Path, RrdFormat]], whole: bool) -> Iterator[
         try:
             done = limited_process.run(reader_process.__file__, ["whole"] if whole else [], names, MEMORY, seconds)
         except limited_process.NotStarted as error:
-            raise ReaderError(f"recordings cannot be read: {error}") from error
+            raise Failed(f"recordings cannot be read: {error}") from error
         *lines, _ = done.output.decode().split("\n")  # Without a line that the end of the process has cut.
         yield from map(json.loads, lines)
         files = files[len(lines) :]

@@ -16,6 +16,7 @@ from typing import IO
 
 from rerun.experimental import ViewerClient
 
+from dextron_bench.errors import Failed
 from dextron_bench.processes import programs
 
 LOOPBACK = "127.0.0.1"
@@ -25,18 +26,14 @@ NOTICE_TIME = 8.0  # [s] after which the viewer no longer shows its notices.
 DRAW_TIME = 1.5  # [s] in which the viewer draws a new step.
 
 
-class ViewerError(RuntimeError):
+class ViewerError(Failed):
     """Rerun's viewer cannot run."""
 
 
-class NoScreen(ViewerError):
-    """The native viewer needs a screen."""
-
-
 def require_screen() -> None:
-    """Raises NoScreen on Linux without a display."""
+    """Raises Failed on Linux without a display."""
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise NoScreen(
+        raise Failed(
             "there is no screen for the native viewer; `view --web` and `browse --web` open recordings in the browser"
         )
 
@@ -91,7 +88,7 @@ def _require(files: Sequence[Path]) -> None:
 def viewer_process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
     """Runs a viewer process; the end of the block ends it and its children.
 
-    Raises NoScreen if it would open a window where there is no screen.
+    Raises Failed if it would open a window where there is no screen.
     """
     if logs is None and HEADLESS not in arguments:
         require_screen()

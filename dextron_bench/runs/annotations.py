@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic, records, run_times
 from dextron_bench.storage.run_folder import RunFolder
 
@@ -16,13 +17,9 @@ TAG = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 LONGEST = 2000  # Characters of a note.
 
 
-class BadNote(ValueError):
-    """A tag with other characters than letters, digits and . _ + -, or a note that is too long."""
-
-
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """The tags and the note of a run. Raises BadNote."""
+    """The tags and the note of a run. Raises BadInput."""
 
     tags: tuple[str, ...] = ()
     note: str = ""
@@ -30,9 +27,9 @@ class Notes:
     def __post_init__(self) -> None:
         for tag in self.tags:
             if not TAG.fullmatch(tag):
-                raise BadNote(f"tag {tag!r}: use letters, digits and . _ + -")
+                raise BadInput(f"tag {tag!r}: use letters, digits and . _ + -")
         if len(self.note) > LONGEST:
-            raise BadNote(f"a note has at most {LONGEST} characters, not {len(self.note)}")
+            raise BadInput(f"a note has at most {LONGEST} characters, not {len(self.note)}")
 
 
 class Failure(records.Record, frozen=True):

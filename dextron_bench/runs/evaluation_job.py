@@ -13,6 +13,7 @@ from typing import Any
 import pandas as pd
 from msgspec.structs import replace
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation import episode_table
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.reaches.setting import Source
@@ -20,7 +21,7 @@ from dextron_bench.runs import annotations, recording_files, run_files
 from dextron_bench.runs.recorder import Recorder
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic, provenance, records, tables
-from dextron_bench.storage.pieces import ForeignPiece, ListedWork, Piece, Recipe
+from dextron_bench.storage.pieces import ListedWork, Piece, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.provenance import Provenance
 from dextron_bench.storage.run_folder import RunFolder
@@ -189,7 +190,7 @@ class EvaluationJob(ListedWork):
         """Replaces the run's provenance by the provenance of all that make it: pieces, earlier episodes, this process.
 
         It is written before the episodes, so that a merge that was killed ends with the same bytes. Raises
-        ForeignPiece.
+        BadInput.
         """
         makers = [piece.provenance for piece in pieces.values()]
         if self.folder.episodes.exists() or self.folder.curve.exists():
@@ -203,10 +204,10 @@ class EvaluationJob(ListedWork):
         atomic.write_json(self.folder.provenance, merged)
 
     def _check_platform(self, merged: Provenance) -> None:
-        """Raises ForeignPiece if some makers have another platform than the first."""
+        """Raises BadInput if some makers have another platform than the first."""
         platforms = {provenance.platform_of(maker) for maker in (merged, *merged.others)}
         if len(platforms) > 1:
-            raise ForeignPiece(
+            raise BadInput(
                 f"{self.folder.path} has pieces of different platforms: {' and '.join(sorted(platforms))}; it may name "
                 "one only: play all pieces on machines of one kind"
             )

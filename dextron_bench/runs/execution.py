@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.results import Training
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods import registry, weights
@@ -26,10 +27,6 @@ from dextron_bench.training import loop
 WEIGHTS = "weights"  # Folder below the runs of another process, with the file of weights.
 
 
-class NotTrained(LookupError):
-    """A run whose weights are missing where nothing may be trained."""
-
-
 def train(
     group: Sequence[Run],
     runs: Path,
@@ -41,7 +38,7 @@ def train(
     """Trains the learner of runs that differ only in their seeds, all seeds together; skips seeds that are trained.
 
     `report` receives epochs, and `watch` the learning curves as they grow. Raises the errors of `execute`, what `watch`
-    raises, and Diverged, Busy, NoDevice.
+    raises, and Failed, Busy, NoDevice.
     """
     for run in group:
         folder_config.check(run.folder(runs).path, run.config())
@@ -52,7 +49,7 @@ def train(
 def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progress) -> Path:
     """Trains and evaluates what the run's folder does not hold yet; returns the folder, with its `result.json`.
 
-    `report` receives the episodes of each split. Raises FolderMismatch, DamagedFile, UnknownSplit, MissingData,
+    `report` receives the episodes of each split. Raises BadInput, DamagedFile, UnknownSplit, MissingData,
     AgentError, MissingWeights, and the errors of `EvaluationJob.table`.
     """
     source, splits = _played(run)  # Splits or data that are missing end the command before the training.
@@ -69,7 +66,7 @@ def execute(run: Run, runs: Path, threads: int = 0, report: Progress = no_progre
 def prepare(run: Run, runs: Path, threads: int = 0, splits: Sequence[Split] = ()) -> EvaluationJob:
     """The evaluation of a run whose training is done, on its splits if they are loaded; writes its folder's config.
 
-    Raises NotTrained, FolderMismatch, DamagedFile, UnknownSplit, MissingData, AgentError, MissingWeights.
+    Raises NotFound, BadInput, DamagedFile, UnknownSplit, MissingData, AgentError, MissingWeights.
     """
     return _prepare(run, runs, *_played(run), threads)
 
@@ -84,7 +81,7 @@ def _prepare(run: Run, runs: Path, source: Source, splits: Sequence[Split], thre
     """The evaluation of a run on splits."""
     folder, file = run.folder(runs), weights_file(run, runs)
     if file and not file.exists():
-        raise NotTrained(
+        raise NotFound(
             f"{run.label} is not trained for seed {run.seed}: {file} is missing, and a share or a merge trains "
             "nothing; train it first with `--split val` and without --share, and copy the folder of runs"
         )
@@ -133,7 +130,7 @@ def _prepare_again(place: Place, plan: plans.Plan, label: str) -> EvaluationJob:
 def agents(run: Run, file: Path | None) -> Callable[[], Agent]:
     """Makes agents of a run, each as if it were the first, with the weights of a file if its method learns.
 
-    Raises BadWeights; what it returns raises AgentError.
+    Raises BadInput; what it returns raises AgentError.
     """
     if run.learner is not None:
         assert file is not None

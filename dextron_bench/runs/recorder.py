@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
+from dextron_bench.errors import Failed
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case
 from dextron_bench.processes.limited_process import SINGLE_THREADED
@@ -28,10 +29,6 @@ APART = {
     "PYTHONWARNINGS": "ignore:resource_tracker",  # Silent if this process is killed.
 }
 _SOURCE: list[Source] = []  # In a process that writes recordings: where their reaches come from.
-
-
-class LostProcess(RuntimeError):
-    """A process that writes recordings has ended too early."""
 
 
 class Recorder:
@@ -58,7 +55,7 @@ class Recorder:
     def write(self, file: Path, case: Case, episode: Episode, properties: dict[str, Any]) -> None:
         """Writes the recording of an episode, now or later, as `recording_files.write` does.
 
-        Raises UnwritableRecording and LostProcess, also for earlier recordings.
+        Raises UnwritableRecording and Failed, also for earlier recordings.
         """
         if not self._pool:
             self._hashes[file] = recording_files.write(self._source, file, case, episode, properties)
@@ -69,7 +66,7 @@ class Recorder:
             self._writing.append((file, self._pool.submit(_write, file, case, episode, properties)))
 
     def hashes(self) -> dict[Path, str]:
-        """The SHA-256 of each file, once all are written. Raises UnwritableRecording, LostProcess."""
+        """The SHA-256 of each file, once all are written. Raises UnwritableRecording, Failed."""
         while self._writing:
             self._wait_for_first()
         return self._hashes
@@ -107,7 +104,7 @@ def _naming_lost_processes() -> Iterator[None]:
     try:
         yield
     except BrokenProcessPool as error:
-        raise LostProcess(
+        raise Failed(
             "a process that writes recordings has ended; "
             "run the command again, with --threads 1 if this process alone shall write them"
         ) from error

@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 from msgspec.structs import replace
 
+from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.results import Maker, Result, scores_by_split
 from dextron_bench.methods.registry import NAME
 from dextron_bench.storage import atomic, records, run_times
@@ -18,10 +19,6 @@ from dextron_bench.storage.provenance import Provenance
 from dextron_bench.storage.run_folder import RunFolder, run_folders, seed_folders
 
 Results = Sequence[Result]
-
-
-class UnknownResult(LookupError):
-    """A name that no result has."""
 
 
 def write_result(folder: RunFolder, table: pd.DataFrame, about: dict[str, Any], seconds: float | None = None) -> None:
@@ -79,16 +76,16 @@ def find(name: str, runs: Path, split: str = "") -> Results:
 
     With a split, a source counts as played if a run there has played that split. If neither place has any result, the
     name is a path: a `result.json`, a run's folder, or the folder of a method's runs.
-    Raises UnknownResult, DamagedFile.
+    Raises NotFound, DamagedFile.
     """
     results = [read_result(file) for file in _files(name, runs, split)]
     if not results:
-        raise UnknownResult(
+        raise NotFound(
             f"no result of {name!r}: {runs} has {_labels(runs)}, and published results are "
             f"{_labels(published_results())}; give one of them, or the path of a run"
         )
     if len(labels := {result.method for result in results}) > 1:
-        raise UnknownResult(f"{name!r} holds results of {_listed(labels)}; give one of them")
+        raise NotFound(f"{name!r} holds results of {_listed(labels)}; give one of them")
     return results
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic, hashing, tables
-from dextron_bench.storage.folder_config import RUN_ADVICE, FolderMismatch
+from dextron_bench.storage.folder_config import RUN_ADVICE
 from dextron_bench.storage.run_folder import RunFolder
 
 
@@ -39,11 +40,11 @@ def failures(folders: Iterable[RunFolder]) -> dict[str, int]:
 def copy_weights(file: Path, folder: RunFolder) -> str:
     """Copies weights into the folder of a run, and returns their SHA-256; each file is read once.
 
-    Raises FolderMismatch if the folder holds other weights.
+    Raises BadInput if the folder holds other weights.
     """
     if not folder.weights.exists():
         atomic.write_atomically(folder.weights, lambda part: shutil.copyfile(file, part))
     sha256 = hashing.sha256(folder.weights)
     if file != folder.weights and hashing.sha256(file) != sha256:
-        raise FolderMismatch(f"{folder.path} holds a run with other weights; {RUN_ADVICE}")
+        raise BadInput(f"{folder.path} holds a run with other weights; {RUN_ADVICE}")
     return sha256

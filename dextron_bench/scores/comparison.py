@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.results import Result
 from dextron_bench.scores import paired, statistics
 from dextron_bench.splits import strata
@@ -16,10 +17,6 @@ from dextron_bench.world import task
 
 ALL = "all"  # The group of all settings.
 Results = Sequence[Result]  # One for each seed.
-
-
-class Incomparable(ValueError):
-    """The results were not scored on the same settings with the same physics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +50,7 @@ class Comparison:
 
 
 def compare(a: SeedScores, b: SeedScores) -> Comparison:
-    """Compares two methods that `align` put on the same settings. Raises DamagedSplit."""
+    """Compares two methods that `align` put on the same settings. Raises BadInput."""
     rows = strata.shipped_strata(a.reaches, a.split, a.digest)
     solved_a, solved_b = _solved(a), _solved(b)
     flips = paired.flips(solved_a > 0.0, solved_b > 0.0)
@@ -121,7 +118,7 @@ def _groups(a: np.ndarray, b: np.ndarray, rows: pd.DataFrame | None) -> Iterator
 
 
 def align_all(names: Sequence[str], results: Sequence[Results], split: str, reaches: str | None) -> list[SeedScores]:
-    """The scores of two or more methods on the same settings; raises Incomparable, as `align` does."""
+    """The scores of two or more methods on the same settings; raises BadInput, as `align` does."""
     first, second = align((names[0], names[1]), (results[0], results[1]), split, reaches)
     others = zip(names[2:], results[2:], strict=True)
     return [
@@ -135,18 +132,16 @@ def align(
 ) -> tuple[SeedScores, SeedScores]:
     """The scores of A and B on the same settings; `reaches` may be None if only one source has results of both.
 
-    Raises Incomparable.
+    Raises BadInput.
     """
     sources_a, sources_b = ({result.reaches for result in seeds} for seeds in results)
     source = _common_source(sources_a, sources_b, reaches)
     a, b = (_seed_scores(name, seeds, source, split) for name, seeds in zip(names, results, strict=True))
     worlds = {result.physics[:8] for seeds in results for result in seeds if result.reaches == source}
     if len(worlds) > 1:
-        raise Incomparable(
-            f"the results were played with different physics, {_sorted_list(worlds)}; run the older again"
-        )
+        raise BadInput(f"the results were played with different physics, {_sorted_list(worlds)}; run the older again")
     if (a.digest, a.scores.shape[1]) != (b.digest, b.scores.shape[1]):
-        raise Incomparable(
+        raise BadInput(
             f"{a.name} and {b.name} played different versions of {split} of {source} reaches, "
             f"{a.digest[:8]} and {b.digest[:8]}; run the older one again"
         )
@@ -159,15 +154,13 @@ def _seed_scores(name: str, results: Results, reaches: str, split: str) -> SeedS
         advice = "; play it, or give the path of other results"
         if without_split != seeds:
             advice = "; other seeds have it: to compare one of them, give its folder"
-        raise Incomparable(
+        raise BadInput(
             f"{name}, seed {without_split[0].seed}, has no split {split!r} of {reaches} reaches; "
             f"it has {_sorted_list(without_split[0].splits)}{advice}"
         )
     splits = [result.splits[split] for result in seeds]
     if len({(result.digest, len(result.scores)) for result in splits}) > 1:
-        raise Incomparable(
-            f"the seeds of {name} played different versions of {split} of {reaches} reaches; run them again"
-        )
+        raise BadInput(f"the seeds of {name} played different versions of {split} of {reaches} reaches; run them again")
     return SeedScores(name, reaches, split, splits[0].digest, np.array([result.scores for result in splits], float))
 
 
@@ -175,14 +168,14 @@ def _common_source(sources_a: set[str], sources_b: set[str], requested: str | No
     """The requested source of reaches, or the only one, if both methods have results on it."""
     common = sources_a & sources_b
     if not common:
-        raise Incomparable(
+        raise BadInput(
             f"A has results on {_sorted_list(sources_a)} reaches, B on {_sorted_list(sources_b)} reaches: "
             "no source is common to both"
         )
     if requested is None and len(common) > 1:
-        raise Incomparable(f"both have results on {_sorted_list(common)} reaches; choose one with --reaches")
+        raise BadInput(f"both have results on {_sorted_list(common)} reaches; choose one with --reaches")
     if requested is not None and requested not in common:
-        raise Incomparable(f"both have results on {_sorted_list(common)} reaches, but not both on {requested} reaches")
+        raise BadInput(f"both have results on {_sorted_list(common)} reaches, but not both on {requested} reaches")
     return requested or next(iter(common))
 
 

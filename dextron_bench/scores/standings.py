@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.evaluation.results import Result, SplitScores
 from dextron_bench.methods import registry
@@ -45,10 +46,6 @@ class Fresh:
     gap: paired.Gap
 
 
-class UnevenResults(ValueError):
-    """Results on one version of a split have different numbers of rows, or another number than the split."""
-
-
 def table(results: Iterable[Result]) -> pd.DataFrame:
     """One row for each method, source, split and split version, best first, with the columns COLUMNS.
 
@@ -58,7 +55,7 @@ def table(results: Iterable[Result]) -> pd.DataFrame:
 
     `fresh` is the mean return on fresh settings, and `gap` how much higher `return` is; NaN if some seed did not play
     fresh settings. A row is `marked` if its gap is beyond noise; its place and its rank then follow from `fresh`.
-    Raises UnevenResults.
+    Raises BadInput.
     """
     rows = [row for key, board in _boards(results).items() for row in _rows(key, board)]
     table = pd.DataFrame(rows, columns=list(COLUMNS))
@@ -93,7 +90,7 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
     regions = strata.start_regions(reaches, split, digest)
     lengths |= set() if regions is None else {len(regions)}  # The split's own number of rows.
     if len(lengths) > 1:
-        raise UnevenResults(
+        raise BadInput(
             f"results on {split} of {reaches}, version {digest[:8]}, have different numbers of rows: "
             f"{', '.join(map(str, sorted(lengths)))}"
         )

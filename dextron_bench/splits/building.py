@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import policies
 from dextron_bench.reaches import setting
 from dextron_bench.splits import hard
@@ -38,14 +39,10 @@ class Sizes:
     coarse: int = 16
 
 
-class TooFewRows(ValueError):
-    """The database is too small for the splits."""
-
-
 def partition(
     source: setting.Source, database: pd.DataFrame, seed: int, sizes: Sizes, rates: Mapping[str, float] | None
 ) -> dict[str, pd.DataFrame]:
-    """The rows of every split except `hard` and `open`, from the solved rows of a database; raises TooFewRows.
+    """The rows of every split except `hard` and `open`, from the solved rows of a database; raises BadInput.
 
     `rates` are the success rates of a search by subject; they decide which two subjects are held out, and None holds
     out none. Held-out reaches are drawn at random. `train` has one row per expert, without the settings that are
@@ -161,7 +158,7 @@ def scan_split(scanner: Scanner, name: str, rows: pd.DataFrame, points: int) -> 
 def _take(rows: pd.DataFrame, first: int, count: int, name: str) -> pd.DataFrame:
     part = rows.iloc[first : first + count]
     if len(part) < count:
-        raise TooFewRows(
+        raise BadInput(
             f"split {name!r} needs {count} solved settings and the database has {len(part)}; continue the search"
         )
     return part

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import branching
 from dextron_bench.experts.policies import Expert
 from dextron_bench.reaches import setting
@@ -40,7 +41,7 @@ class Sizes:
 def build(folder: Path, engine: Engine, seed: int = 0, sizes: Sizes | None = None) -> dict[str, dict[str, Any]]:
     """Makes, scans and writes the splits of `minjerk` into `folder`; returns their entry in the catalogue.
 
-    Raises TooFewRows if too few of the first REACHES reaches, or of the next REACHES reaches, are solved.
+    Raises BadInput if too few of the first REACHES reaches, or of the next REACHES reaches, are solved.
     """
     sizes = sizes or Sizes()
     source = MinjerkSource()
@@ -60,13 +61,13 @@ def draw(source: MinjerkSource, engine: Engine, seed: int, sizes: Sizes) -> dict
 
 
 def first_solved(source: MinjerkSource, numbers: np.ndarray, count: int, engine: Engine, batch: int) -> pd.DataFrame:
-    """The first `count` rows, in the order of `numbers`, in which EXPERT scores 20; raises TooFewRows."""
+    """The first `count` rows, in the order of `numbers`, in which EXPERT scores 20; raises BadInput."""
     solved: list[setting.Setting] = []
     for part in np.split(numbers, range(batch, len(numbers), batch)):
         solved += _solved([setting.Setting(f"minjerk-{number:06d}", 0.0, 0.0, 0.0) for number in part], source, engine)
         if len(solved) >= count:
             return setting.to_frame(solved[:count]).assign(gain=EXPERT.gain, critical=EXPERT.critical)
-    raise building.TooFewRows(f"the splits need {count} solved minjerk reaches and there are {len(solved)}")
+    raise BadInput(f"the splits need {count} solved minjerk reaches and there are {len(solved)}")
 
 
 def _solved(settings: list[setting.Setting], source: MinjerkSource, engine: Engine) -> Iterator[setting.Setting]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import montecarlo, outcomes
 from dextron_bench.experts.policies import Case
 from dextron_bench.reaches import setting
@@ -34,10 +35,6 @@ REACHES = {  # The splits whose reaches a fresh split has: the same distribution
 }
 
 
-class NoFreshSettings(ValueError):
-    """A split that cannot be drawn again."""
-
-
 def seed_of(submission: str, beacon: str) -> int:
     """The seed of fresh settings, from a submission's hash and a value that was not known when it was made."""
     return int(hashing.digest(f"{submission}\n{beacon}".encode())[:16], 16)
@@ -47,11 +44,11 @@ def draw(reaches: str, name: str, seed: int, engine: Engine, rows: int = 0, prog
     """A split of `rows` fresh cases (0: as many as the shipped split `name` has); equal for equal seeds.
 
     Offsets and duration noise are drawn anew, and a setting is kept if a search with eight experts solves it. Each case
-    has one of the experts that solve it, and no window. `hard` is drawn as it was built. Raises NoFreshSettings,
+    has one of the experts that solve it, and no window. `hard` is drawn as it was built. Raises BadInput,
     UnknownSplit, MissingData.
     """
     if reaches == "minjerk" or name not in (*REACHES, "hard"):
-        raise NoFreshSettings(f"{name} of {reaches} reaches is not drawn by a search; choose from {list(REACHES)}")
+        raise BadInput(f"{name} of {reaches} reaches is not drawn by a search; choose from {list(REACHES)}")
     source, count = open_source(reaches), rows or len(load_split(reaches, name))
     if name == "hard":
         table = _hard(source, reaches, count, seed, engine, progress)

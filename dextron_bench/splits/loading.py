@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches import setting
 from dextron_bench.splits import tracks
-from dextron_bench.splits.rows import Rows, UnknownRow
+from dextron_bench.splits.rows import Rows
 from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.storage import hashing
 from dextron_bench.world import bottle
@@ -26,7 +27,7 @@ SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "hard",
 EVALUATED = ("test", "unseen-reach", "unseen-subject", "hard")
 
 
-class UnknownSplit(KeyError):
+class UnknownSplit(NotFound):
     """A source of reaches has no split of that name."""
 
     def __init__(self, name: str, reaches: str, names: Sequence[str]) -> None:
@@ -35,10 +36,6 @@ class UnknownSplit(KeyError):
 
     def __str__(self) -> str:
         return str(self.args[0])
-
-
-class DamagedSplit(ValueError):
-    """A split cannot be read, or its content differs from its hash."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,9 +47,9 @@ class Split(Rows):
     digest: str
 
     def case(self, row: int) -> Case:
-        """The case of a row; raises UnknownRow."""
+        """The case of a row; raises NotFound."""
         if not 0 <= row < len(self):
-            raise UnknownRow(f"{self.name} of {self.reaches} reaches has rows 0 to {len(self) - 1}, not {row}")
+            raise NotFound(f"{self.name} of {self.reaches} reaches has rows 0 to {len(self) - 1}, not {row}")
         return self.cases[row]
 
 
@@ -77,7 +74,7 @@ def all_splits() -> list[tuple[str, str]]:
 def load_split(reaches: str, name: str) -> Split:
     """The shipped split of a name, verified against its hash, perhaps under a track, as in `test+delay-100`.
 
-    Raises UnknownSplit, UnknownTrack, DamagedSplit.
+    Raises UnknownSplit, UnknownTrack, BadInput.
     """
     if not isinstance(reaches, str) or not isinstance(name, str):
         raise UnknownSplit(name, reaches, known_splits(reaches) if isinstance(reaches, str) else ())
@@ -122,16 +119,14 @@ def _splits_with_bottles(reaches: str) -> list[str]:
 
 
 def _rows(table: pd.DataFrame, reaches: str, name: str) -> tuple[pd.DataFrame, str]:
-    """The rows of a split, and their hash; raises DamagedSplit if it is not the hash of the catalogue."""
+    """The rows of a split, and their hash; raises BadInput if it is not the hash of the catalogue."""
     try:
         rows = table[table["split"] == name]
         digest, expected = split_digest(rows), _catalogue()[reaches][name]["digest"]
     except (KeyError, ValueError, TypeError) as error:
-        raise DamagedSplit(f"the splits of {reaches!r} reaches lack {error}; reinstall the package") from error
+        raise BadInput(f"the splits of {reaches!r} reaches lack {error}; reinstall the package") from error
     if digest != expected:
-        raise DamagedSplit(
-            f"split {name!r} of {reaches!r} reaches is damaged (hash {digest[:12]}); reinstall the package"
-        )
+        raise BadInput(f"split {name!r} of {reaches!r} reaches is damaged (hash {digest[:12]}); reinstall the package")
     return rows, digest
 
 
@@ -159,7 +154,7 @@ def _catalogue() -> dict[str, dict[str, Any]]:
     try:
         return json.loads(files("dextron_bench.data").joinpath("splits.json").read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError) as error:
-        raise DamagedSplit(f"the catalogue of splits cannot be read ({error}); reinstall the package") from error
+        raise BadInput(f"the catalogue of splits cannot be read ({error}); reinstall the package") from error
 
 
 @cache
@@ -170,4 +165,4 @@ def _table(reaches: str, name: str) -> pd.DataFrame:
         except (OSError, ValueError) as error:
             if isinstance(error, OSError) and error.errno not in (None, errno.ENOENT):  # Permission, for example.
                 raise
-            raise DamagedSplit(f"the splits of {reaches!r} reaches cannot be read; reinstall the package") from error
+            raise BadInput(f"the splits of {reaches!r} reaches cannot be read; reinstall the package") from error

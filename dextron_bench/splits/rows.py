@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from dextron_bench.errors import NotFound
 from dextron_bench.experts.policies import Case
 from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.world.bottle import Bottle
-
-
-class UnknownRow(LookupError):
-    """There is no row of that number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,13 +30,13 @@ class Rows:
         return len(self.cases)
 
     def case(self, row: int) -> Case:
-        """The case of a row; raises UnknownRow."""
+        """The case of a row; raises NotFound."""
         if not 0 <= row < len(self):
-            raise UnknownRow(f"there are rows 0 to {len(self) - 1}, not {row}")
+            raise NotFound(f"there are rows 0 to {len(self) - 1}, not {row}")
         return self.cases[row]
 
     def rows(self, numbers: Iterable[int]) -> Rows:
-        """The rows of these numbers, in their order, under the same conditions; raises UnknownRow."""
+        """The rows of these numbers, in their order, under the same conditions; raises NotFound."""
         chosen = list(numbers)
         cases = tuple(self.case(row) for row in chosen)
         return Rows(cases=cases, track=self.track, bottles=tuple(self.bottles[row] for row in chosen if self.bottles))

@@ -45,7 +45,7 @@ def by_subject(split: Split, subject: str) -> tuple[Split, Split]:
 
 
 def shipped_strata(reaches: str, name: str, digest: str) -> pd.DataFrame | None:
-    """The strata of a shipped split's rows; None if no split of that name and digest ships. Raises DamagedSplit."""
+    """The strata of a shipped split's rows; None if no split of that name and digest ships. Raises BadInput."""
     try:
         split = load_split(reaches, name)
     except UnknownSplit:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dextron_bench.errors import NotFound
+
 PLUS = "+"  # Between the names of a split and of a track.
 
 
@@ -63,7 +65,7 @@ TRACKS = {
 }
 
 
-class UnknownTrack(LookupError):
+class UnknownTrack(NotFound):
     """A track that does not exist."""
 
     def __init__(self, name: str) -> None:

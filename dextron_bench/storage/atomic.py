@@ -13,6 +13,8 @@ from typing import Any, NoReturn
 
 import msgspec
 
+from dextron_bench.errors import BadInput
+
 PART = ".part"  # Ending of the names of files and folders that are not complete; these names start with a dot.
 ABANDONED = 24 * 3600.0  # [s] since the last change of a temporary file whose process has surely ended.
 LACKING = {  # What a file system answers to a call that it does not have; a full disk or a fault answers otherwise.
@@ -21,7 +23,7 @@ LACKING = {  # What a file system answers to a call that it does not have; a ful
 NO_LINKS = LACKING | {errno.EPERM, errno.EACCES, errno.EMLINK, errno.EXDEV}  # Of `os.link`, where files can be made.
 
 
-class DamagedFile(ValueError):
+class DamagedFile(BadInput):
     """A file whose content is not what was written; the message names it and says what to do.
 
     Only where this is proven does the message advise to remove anything. The subclasses are for all other cases.

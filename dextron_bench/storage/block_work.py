@@ -14,11 +14,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
+from dextron_bench.errors import NotFound
 from dextron_bench.storage import shares
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.pieces import FOLDER, Work
 from dextron_bench.storage.progress import Progress, no_progress
-from dextron_bench.storage.shares import MissingPieces, Share
+from dextron_bench.storage.shares import Share
 
 BLOCKS = "blocks"  # The folder of the blocks that are no pieces, or no longer.
 
@@ -38,7 +39,7 @@ class BlockWork(Work):
 
     @abstractmethod
     def begin(self) -> None:
-        """Writes what the folder belongs to; raises FolderMismatch if it belongs to other work."""
+        """Writes what the folder belongs to; raises BadInput if it belongs to other work."""
 
     @abstractmethod
     def amounts(self) -> Mapping[int, float]:
@@ -82,7 +83,7 @@ class BlockWork(Work):
         return f"{sum(share.has(number // self.cycle) for number in amounts)} blocks"
 
     def check_complete(self) -> None:
-        """Raises MissingPieces if blocks are missing for the goal, and the errors of `begin` and `stored`."""
+        """Raises NotFound if blocks are missing for the goal, and the errors of `begin` and `stored`."""
         self.begin()
         self.stored()
         amounts = self.amounts()
@@ -90,7 +91,7 @@ class BlockWork(Work):
             what, count = f"{self.what} in {self.place}", max(amounts, default=-1) + 1
             titles = [self.title(name_of(number)) for number in range(count)]
             shares.check_complete(what, titles, {self.title(name_of(number)) for number in amounts})
-            raise MissingPieces(
+            raise NotFound(
                 f"{what} lacks the blocks from {name_of(count)} on: the blocks before have {sum(amounts.values())} of "
                 f"{self.goal} {self.unit}; run the shares again, or leave out --merge"
             )

@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic, provenance, records, run_times
 from dextron_bench.storage.run_folder import RunFolder
 
@@ -16,12 +17,8 @@ TRIES, PAUSE = 10, 0.1  # Looks at an empty config, and seconds between them; th
 RUN_ADVICE = "remove it, or choose another folder with --runs"
 
 
-class FolderMismatch(ValueError):
-    """A folder that holds a different config from the given one."""
-
-
 def check(folder: Path, config: Mapping[str, Any]) -> None:
-    """Raises FolderMismatch if a folder holds a run of another config, DamagedFile if its config cannot be read."""
+    """Raises BadInput if a folder holds a run of another config, DamagedFile if its config cannot be read."""
     _check(RunFolder(folder).config, config, "run", RUN_ADVICE)
 
 
@@ -44,7 +41,7 @@ def write_or_check(folder: Path, config: Mapping[str, Any], defaults: Mapping[st
 
 
 def write_or_check_file(file: Path, config: Mapping[str, Any], content: str, advice: str) -> None:
-    """Writes a config to a file that does not exist yet; raises FolderMismatch if the file holds another config.
+    """Writes a config to a file that does not exist yet; raises BadInput if the file holds another config.
 
     The message says that the folder holds another `content`, such as "search", names the entries that differ, and ends
     with `advice`.
@@ -71,7 +68,7 @@ def _check(file: Path, config: Mapping[str, Any], content: str, advice: str) -> 
         time.sleep(PAUSE)
     stored, expected = records.read(file, dict[str, Any]), json.loads(atomic.json_text(config))
     if names := list(differences(stored, expected)):
-        raise FolderMismatch(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")
+        raise BadInput(f"{file.parent} holds another {content}: it differs in {' and '.join(names)}; {advice}")
 
 
 def differences(stored: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:

@@ -10,16 +10,13 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from dextron_bench.errors import Failed
 from dextron_bench.storage import atomic, locks
 
 LOCK = ".locked"  # In a folder that a process changes, or in which it replaces another folder.
 EXCHANGE, HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux.
 NO_EXCHANGE = atomic.LACKING | {errno.EPERM, errno.EXDEV, errno.ENOTTY}  # Then two renames do it, or say why not.
 OLD = ".old"  # Ending of the name of a folder that is being replaced; the name starts with a dot.
-
-
-class FolderBusy(RuntimeError):
-    """A folder that another process changes."""
 
 
 def visible(folder: Path, pattern: str) -> list[Path]:
@@ -84,7 +81,7 @@ def replacing(folder: Path) -> Iterator[Path]:
     """Yields a copy of a folder beside it, hidden; at the end, the copy takes its place in one step.
 
     If the process dies at any moment, the folder holds all of its old content or all of its new content. After an error
-    it holds the old content. What a process that was killed left behind is removed by the next call. Raises FolderBusy
+    it holds the old content. What a process that was killed left behind is removed by the next call. Raises Failed
     if another process replaces a folder beside this one.
     """
     folder = folder.resolve()
@@ -195,10 +192,10 @@ def _sync_tree(folder: Path) -> None:
 
 @contextmanager
 def locked(place: Path, changed: Path) -> Iterator[None]:
-    """Holds the lock of a folder while `changed`, at or below it, is changed; raises FolderBusy."""
+    """Holds the lock of a folder while `changed`, at or below it, is changed; raises Failed."""
     with ExitStack() as lock:
         try:
             lock.enter_context(locks.held(place / LOCK))
         except locks.Held as error:
-            raise FolderBusy(f"another process is changing {changed}; wait for it, and run again ({error})") from None
+            raise Failed(f"another process is changing {changed}; wait for it, and run again ({error})") from None
         yield

@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from dextron_bench.errors import NotFound
 
-class NoHome(LookupError):
+
+class NoHome(NotFound):
     """A path in a home folder that is not known; the message says what to do."""
 
 

@@ -25,6 +25,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO
 
+from dextron_bench.errors import Failed
 from dextron_bench.storage import atomic
 
 try:
@@ -53,7 +54,7 @@ class Holder:
         return f"process {self.process} on {self.host}, since {self.since}"
 
 
-class Held(RuntimeError):
+class Held(Failed):
     """A lock that another process holds; the message says who, and when its file may be removed."""
 
     def __init__(self, file: Path, holder: Holder | None, is_certain: bool) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 
 import msgspec
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic, folder_config, hashing, provenance, records
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
@@ -26,14 +27,6 @@ from dextron_bench.storage.records import Record
 FOLDER = "pieces"
 CODE = "the benchmark's code"  # In a message.
 REMEDY = "use the same command, code and data on all machines, or remove it and run its share again"
-
-
-class DoubledPiece(ValueError):
-    """Two files that are the same piece."""
-
-
-class ForeignPiece(ValueError):
-    """A piece of other work: of another config, code, physics or data."""
 
 
 class Stamp(Record, frozen=True):
@@ -126,7 +119,7 @@ class Work(ABC):
     def stored(self) -> dict[str, Piece]:
         """The pieces of this work that are there, by name.
 
-        Raises ForeignPiece, DoubledPiece, and DamagedFile if a file of a piece is missing or was changed.
+        Raises BadInput, and DamagedFile if a file of a piece is missing or was changed.
         """
         pieces: dict[str, Piece] = {}
         for file in visible(self.place / FOLDER, "*.json"):
@@ -135,13 +128,11 @@ class Work(ABC):
             if config is None:
                 continue
             if name in pieces:
-                raise DoubledPiece(f"{pieces[name].stamp} and {file} are the same piece, {name}; remove one of them")
+                raise BadInput(f"{pieces[name].stamp} and {file} are the same piece, {name}; remove one of them")
             stored = {CODE: stamp.code, **stamp.depends_on}
             expected = {CODE: self.code, **_with_simulator(config)}
             if differing := list(folder_config.differences(stored, expected)):
-                raise ForeignPiece(
-                    f"{file} is a piece of other work: it differs in {' and '.join(differing)}; {REMEDY}"
-                )
+                raise BadInput(f"{file} is a piece of other work: it differs in {' and '.join(differing)}; {REMEDY}")
             pieces[name] = Piece(file, self._checked_files(file, stamp.files), stamp.provenance)
         return pieces
 

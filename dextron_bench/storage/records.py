@@ -17,6 +17,7 @@ from typing import Annotated, Any, TypeVar
 import msgspec
 from msgspec import Meta
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic
 
 FULL_RETURN = 20.0  # The largest sum of rewards of an episode, `world.task.SUCCESS`.
@@ -37,7 +38,7 @@ class Record(msgspec.Struct, frozen=True, omit_defaults=True):
     """What a file, or a part of one, holds."""
 
 
-class Mismatch(ValueError):
+class Mismatch(BadInput):
     """A value that does not have the form of its record: `place` of the fault, empty for the whole, and `why`."""
 
     def __init__(self, place: str, why: str) -> None:

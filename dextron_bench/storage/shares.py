@@ -7,18 +7,11 @@ from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.storage.pieces import ListedWork
 from dextron_bench.storage.progress import Progress
 
 LISTED = 4  # Names in a message.
-
-
-class BadShare(ValueError):
-    """A share that does not exist, or flags that contradict each other."""
-
-
-class MissingPieces(LookupError):
-    """A merge that lacks pieces; the message names them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +23,14 @@ class Share:
 
     def __post_init__(self) -> None:
         if not 0 <= self.index < self.of:
-            raise BadShare(f"share {self.index}/{self.of} does not exist; shares count from 0")
+            raise BadInput(f"share {self.index}/{self.of} does not exist; shares count from 0")
 
     @classmethod
     def parse(cls, text: str) -> Share:
-        """The share that a text like 0/2 names; raises BadShare."""
+        """The share that a text like 0/2 names; raises BadInput."""
         index, _, of = text.partition("/")
         if not (index.isdecimal() and of.isdecimal()):
-            raise BadShare(f"share {text!r} is not like 0/2, the first of two")
+            raise BadInput(f"share {text!r} is not like 0/2, the first of two")
         return cls(int(index), int(of))
 
     def has(self, place: int) -> bool:
@@ -61,16 +54,16 @@ def play(works: Sequence[ListedWork], share: Share, bar: Callable[[str], Abstrac
 
 
 def check(works: Sequence[ListedWork]) -> None:
-    """Raises MissingPieces if a piece is not done."""
+    """Raises NotFound if a piece is not done."""
     names = [work.title(name) for work in works for name in work.names()]
     check_complete("the merge", names, {work.title(name) for work in works for name in work.done()})
 
 
 def check_complete(what: str, names: Sequence[str], present: Collection[str]) -> None:
-    """Raises MissingPieces if one of the names of pieces is not present."""
+    """Raises NotFound if one of the names of pieces is not present."""
     if missing := [name for name in names if name not in present]:
         listed = ", ".join(itertools.islice(missing, LISTED)) + (", ..." if len(missing) > LISTED else "")
-        raise MissingPieces(
+        raise NotFound(
             f"{what} lacks {len(missing)} of {len(names)} pieces: {listed}; run the shares that have them and put all "
             "folders together, or leave out --merge to do them here"
         )

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic, hashing
 from dextron_bench.storage.records import FULL_RETURN
 
@@ -59,7 +60,7 @@ DRAWS: Columns = {  # Of a block of a search.
 }  # fmt: skip
 
 
-class BadTable(ValueError):
+class BadTable(BadInput):
     """A file that is not the table that it should be; the message says why, and does not name the file."""
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from safetensors.numpy import load, save
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic, hashing
 
 ABOUT = "about"  # The only key of a file's metadata: several keys would have no fixed order.
@@ -25,7 +26,7 @@ LENGTH = 8  # [bytes] at the start of a file that hold the length of the header.
 LONGEST_HEADER = 16 * 2**20  # [bytes]; a parsed header takes up to thirty times as much memory.
 
 
-class BadTensors(ValueError):
+class BadTensors(BadInput):
     """A file that is damaged or not a safetensors file."""
 
     def __init__(self, file: Path, why: object) -> None:

@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 from msgspec import to_builtins
 from msgspec.structs import replace
 
+from dextron_bench.errors import BadInput
 from dextron_bench.processes import limited_process
 from dextron_bench.storage import atomic, hashing, records
 from dextron_bench.storage.folders import visible
@@ -51,7 +52,7 @@ CHUNK = 2**20  # [bytes] that are copied at once.
 MEMBER_DATE = (1980, 1, 1, 0, 0, 0)  # The same for every member, so that equal contents make equal bundles.
 
 
-class BadBundle(ValueError):
+class BadBundle(BadInput):
     """A file that is not a complete bundle, or files that differ from its manifest."""
 
 

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.methods import registry, specs
 from dextron_bench.methods.isolation.launch import Launch, prepare_launch
@@ -21,10 +22,6 @@ MANIFEST_KINDS: dict[str, AgentKind] = {
 }
 
 
-class BadSubmission(ValueError):
-    """An entry that cannot be submitted; the message says what is wrong."""
-
-
 def whole_settings(spec: str, settings: dict[str, Any], reaches: str) -> dict[str, Any]:
     """An agent's settings; an installed method also has its defaults for the source of reaches.
 
@@ -37,7 +34,7 @@ def whole_settings(spec: str, settings: dict[str, Any], reaches: str) -> dict[st
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What is submitted: an agent, by its spec, on a source of reaches, with seeds. Raises BadSubmission."""
+    """What is submitted: an agent, by its spec, on a source of reaches, with seeds. Raises BadInput."""
 
     name: str
     spec: str
@@ -50,13 +47,13 @@ class Entry:
 
     def __post_init__(self) -> None:
         if other := names.imitated(self.name, registry.installed_methods()):
-            raise BadSubmission(f"the name {self.name!r} looks like the name of the method {other!r}; choose another")
+            raise BadInput(f"the name {self.name!r} looks like the name of the method {other!r}; choose another")
         if len(self.seeds) > bundle.MOST_SEEDS:
-            raise BadSubmission(f"a submission has at most {bundle.MOST_SEEDS} seeds, not {len(self.seeds)}")
+            raise BadInput(f"a submission has at most {bundle.MOST_SEEDS} seeds, not {len(self.seeds)}")
         if sorted(self.seeds) != list(range(len(self.seeds))):
-            raise BadSubmission("seeds must be 0, 1, 2 and so on, so that nobody can choose the best: --seed 0 1 2")
+            raise BadInput("seeds must be 0, 1, 2 and so on, so that nobody can choose the best: --seed 0 1 2")
         if not registry.NAME.fullmatch(self.name) or len(self.name) > 64:
-            raise BadSubmission(
+            raise BadInput(
                 f"{self.name!r} is not a valid name: use up to 64 letters, digits and . _ + -, as in 'my-agent'"
             )
 

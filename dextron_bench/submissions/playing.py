@@ -32,7 +32,7 @@ def play_entry(
 ) -> Path:
     """Plays the episodes of an entry that the folder of runs lacks; returns the folder of the entry's seeds.
 
-    Raises AgentError if the agent does not start, FolderMismatch if the folder belongs to another entry, MissingData.
+    Raises AgentError if the agent does not start, BadInput if the folder belongs to another entry, MissingData.
     """
     for job in prepare_all(entry, runs, record, limits, threads):
 
@@ -47,7 +47,7 @@ def prepare_all(entry: Entry, runs: Path, record: int, limits: Limits, threads: 
     """The evaluation of each seed of an entry; writes the configs of their folders.
 
     A piece of an evaluation is a whole split, since its rows are shuffled. Raises BadBundle if a bundle could not hold
-    the entry, FolderMismatch, MissingData.
+    the entry, BadInput, MissingData.
     """
     launch, manifest, files = entry.launch, entry.manifest(), entry.files()
     bundle.check(to_builtins(manifest), Manifest, entry.folder(runs))

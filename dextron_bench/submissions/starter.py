@@ -5,17 +5,15 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+from dextron_bench.errors import BadInput
+
 FILES = ("agent.py", "test_agent.py")
 
 
-class FolderInUse(FileExistsError):
-    """A folder that is not new and not empty."""
-
-
 def copy_template(folder: Path) -> list[Path]:
-    """Writes the template's files into a new or empty folder and returns them; raises FolderInUse, OSError."""
+    """Writes the template's files into a new or empty folder and returns them; raises BadInput, OSError."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise FolderInUse(f"{folder} exists already; name a new folder")
+        raise BadInput(f"{folder} exists already; name a new folder")
     folder.mkdir(parents=True, exist_ok=True)
     template = files("dextron_bench.submissions.template")
     for name in FILES:

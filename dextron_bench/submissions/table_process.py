@@ -16,6 +16,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from dextron_bench.errors import BadInput
+
 SETTING = ("reach", "offset_x", "offset_y", "duration_noise")
 FLAGS, NUMBERS = ("success", "terminated", "truncated"), (*SETTING[1:], "score", "closing_lag")
 TEXTS, COUNTS = ("split", "digest", "reach", "failure", "cause", "trace"), ("row", "length")
@@ -24,7 +26,7 @@ MAY_LACK = {"closing_lag"}  # Empty if the hand never closed.
 COLUMNS = {*FLAGS, *NUMBERS, *TEXTS, *COUNTS, *LISTS}
 
 
-class BadTable(ValueError):
+class BadTable(BadInput):
     """A table that no run writes; the message does not name the file."""
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.storage import records, tensors
 from dextron_bench.storage.folders import visible
 from dextron_bench.world import model
@@ -20,14 +21,6 @@ REMEDY = "remove it, and run the same `dextron-bench success data` again"
 TEST_EVERY = 5  # One setting in five is for testing, with all of its episodes: 80 % and 20 % (paper, II.E).
 
 
-class EmptyDataset(LookupError):
-    """The folder holds no blocks."""
-
-
-class BadDataset(ValueError):
-    """The blocks of a folder cannot be used for training."""
-
-
 class Dataset:
     """The transitions of the training episodes in a folder, or of its test episodes, counted from 0.
 
@@ -35,21 +28,21 @@ class Dataset:
     """
 
     def __init__(self, folder: Path, test: bool = False) -> None:
-        """Opens the training episodes, or with `test` the test episodes. Raises EmptyDataset, BadDataset."""
+        """Opens the training episodes, or with `test` the test episodes. Raises NotFound, BadInput."""
         files = visible(folder / "blocks", "[0-9]*.safetensors")
         if not files:
-            raise EmptyDataset(f"{folder} holds no data set; make one with `dextron-bench success data`")
+            raise NotFound(f"{folder} holds no data set; make one with `dextron-bench success data`")
         if gaps := [number for number, file in enumerate(files) if int(file.stem) != number]:
-            raise BadDataset(f"{folder} lacks block {gaps[0]:06d}; run the same `dextron-bench success data` again")
+            raise BadInput(f"{folder} lacks block {gaps[0]:06d}; run the same `dextron-bench success data` again")
         self._files, self._blocks = files, [open_block(file) for file in files]
         if len(np.unique(np.concatenate([block["solved"] for block in self._blocks]))) < 2:
-            raise BadDataset(
+            raise BadInput(
                 f"all episodes in {folder} have the same outcome, so there is nothing to learn from them; "
                 "run `dextron-bench success data` with more --rows"
             )
         is_test = _held_out([block["states"][block["starts"][:-1]] for block in self._blocks])
         if test and not any(mask.any() for mask in is_test):
-            raise BadDataset(
+            raise BadInput(
                 f"the episodes in {folder} have fewer than {TEST_EVERY} settings, so none can be held out; "
                 "run `dextron-bench success data` with more --rows"
             )
@@ -65,7 +58,7 @@ class Dataset:
     def take(self, transitions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """States (B, 48) and actions (B,) as float32, and outcomes (B,), 1 for success, of transitions (B,).
 
-        Raises BadDataset if a state or an action is not finite.
+        Raises BadInput if a state or an action is not finite.
         """
         episodes = np.searchsorted(self._ends, transitions, side="right")
         steps = transitions - np.append(0, self._ends)[episodes]
@@ -95,7 +88,7 @@ def _held_out(first_states: Sequence[np.ndarray]) -> list[np.ndarray]:
 def open_block(file: Path) -> dict[str, np.ndarray]:
     """Arrays of a block, mapped from the disk: `states` (R, 48), `actions` (R,), `starts` (E + 1,), `solved` (E,).
 
-    Raises BadDataset, OSError.
+    Raises BadInput, OSError.
     """
     try:
         arrays = tensors.memory_mapped(file)
@@ -105,7 +98,7 @@ def open_block(file: Path) -> dict[str, np.ndarray]:
             raise _damaged(file, f"has an array {wrong[0]!r} of the wrong shape {arrays[wrong[0]].shape}")
         tensors.check(file, arrays)
     except tensors.BadTensors as error:
-        raise BadDataset(f"{error}; {REMEDY}") from error
+        raise BadInput(f"{error}; {REMEDY}") from error
     except KeyError as error:
         raise _damaged(file, f"lacks {error}") from error
     return arrays
@@ -124,5 +117,5 @@ def read_config(folder: Path) -> DatasetConfig | None:
     return records.read(file, DatasetConfig) if file.exists() else None
 
 
-def _damaged(file: Path, fault: str) -> BadDataset:
-    return BadDataset(f"{file} {fault}; {REMEDY}")
+def _damaged(file: Path, fault: str) -> BadInput:
+    return BadInput(f"{file} {fault}; {REMEDY}")

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import CRITICAL_DISTANCE, GAIN, Case, Expert, ExpertAgent
 from dextron_bench.methods import weights
@@ -35,10 +36,6 @@ POLICIES = "policies"  # Folder below the runs of another process, with the weig
 KINDS = SOLVED, UNIFORM, POLICY = ("solved", "uniform", "policy")
 
 
-class BadDatasetConfig(ValueError):
-    """A config has values that no data set can have."""
-
-
 @dataclass(frozen=True)
 class DatasetConfig:
     """Config of a data set: equal configs give equal rows.
@@ -55,7 +52,7 @@ class DatasetConfig:
 
     def __post_init__(self) -> None:
         if self.block < dataset.TEST_EVERY or self.seed < 0:
-            raise BadDatasetConfig(
+            raise BadInput(
                 f"a data set needs at least {dataset.TEST_EVERY} episodes in a block, and a seed of 0 or more"
             )
 
@@ -101,7 +98,7 @@ def open_generation(
 ) -> Generation:
     """The generation of a data set in a folder. `policies` are files of weights, by the names that the config has.
 
-    Without `policies`, they are where another process has put them. Raises BadWeights, MissingData.
+    Without `policies`, they are where another process has put them. Raises BadInput, MissingData.
     """
     if policies is None:
         policies = {name: place.runs / POLICIES / name for name in config.policies}
@@ -136,10 +133,10 @@ class Generation(BlockWork):
     def begin(self) -> None:
         """Writes the config of the data set, or checks that the folder has no other.
 
-        Raises FolderMismatch, BadDatasetConfig.
+        Raises BadInput.
         """
         if self.goal < 1:
-            raise BadDatasetConfig(f"--rows is the number of transitions to generate, 1 or more, not {self.goal}")
+            raise BadInput(f"--rows is the number of transitions to generate, 1 or more, not {self.goal}")
         advice = "choose another folder, or remove it"
         folder_config.write_or_check_file(self.place / dataset.CONFIG, self.config_of(""), "data set", advice)
 
@@ -167,8 +164,8 @@ class Generation(BlockWork):
         """Plays blocks until the goal is reached; returns a tally of each kind.
 
         `progress` receives numbers of transitions. Blocks of shares are checked; the data set gets those that it needs,
-        and the others are removed. Raises BadDatasetConfig, FolderMismatch if the folder holds another data set,
-        BadDataset if a block is damaged, and the errors of `rollout` and of `stored`.
+        and the others are removed. Raises BadInput if the folder holds another data set,
+        BadInput if a block is damaged, and the errors of `rollout` and of `stored`.
         """
         self.begin()
         pieces = self.stored()
@@ -209,7 +206,7 @@ class Generation(BlockWork):
 
 
 def block_tally(file: Path) -> Tally:
-    """The tally of a block; raises BadDataset, OSError."""
+    """The tally of a block; raises BadInput, OSError."""
     arrays = dataset.open_block(file)
     return Tally(len(arrays["actions"]), len(arrays["solved"]), int(arrays["solved"].sum()))
 

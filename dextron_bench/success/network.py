@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.methods.exact import Perceptron, rounded
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
@@ -21,11 +22,7 @@ BLOCK = 8  # States whose curves are computed together: alike, if they follow ea
 CLIP = 10.0  # Scaled states are clipped to [-CLIP, CLIP].
 
 
-class BadModel(ValueError):
-    """The arrays do not form a success model."""
-
-
-class MissingModel(LookupError):
+class MissingModel(NotFound):
     """No success model ships for the source of reaches."""
 
 
@@ -35,7 +32,7 @@ class SuccessModel:
     def __init__(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Takes `mean` and `deviation` (48,) of states, and weights and biases as `layer.0` to `layer.5` (SIZES).
 
-        Raises BadModel.
+        Raises BadInput.
         """
         names = [f"layer.{i}" for i in range(len(SIZES))]
         _check(arrays, dict(zip(names, SIZES, strict=True)) | dict.fromkeys(("mean", "deviation"), (model.STATE,)))
@@ -70,13 +67,13 @@ class SuccessModel:
 def _check(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[int, ...]]) -> None:
     for name, shape in shapes.items():
         if name not in arrays or np.shape(arrays[name]) != shape:
-            raise BadModel(f"these arrays are not a success model: {name!r} does not have the shape {shape}")
+            raise BadInput(f"these arrays are not a success model: {name!r} does not have the shape {shape}")
         if not np.isfinite(arrays[name]).all():
-            raise BadModel(f"a success model needs finite numbers; {name!r} holds others")
+            raise BadInput(f"a success model needs finite numbers; {name!r} holds others")
     if not (np.asarray(arrays["deviation"]) > 0.0).all():
-        raise BadModel("a success model needs a 'deviation' above 0 for every number of a state")
+        raise BadInput("a success model needs a 'deviation' above 0 for every number of a state")
     if extra := sorted(arrays.keys() - shapes.keys()):
-        raise BadModel(f"these arrays are not a success model: they also hold {extra[0]!r}; take a model.safetensors")
+        raise BadInput(f"these arrays are not a success model: they also hold {extra[0]!r}; take a model.safetensors")
 
 
 @cache

@@ -14,8 +14,8 @@ import torch
 from msgspec import Meta, to_builtins
 from torch import Tensor, nn
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import records, tensors
-from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.records import Count, Number, Record
 from dextron_bench.success.dataset import Dataset, read_config
@@ -26,10 +26,6 @@ MODEL = "model.safetensors"  # In the same folder: the trained model.
 SCALE_ROWS = 100_000  # Transitions that give mean and deviation of the states.
 TEST_ROWS = 50_000  # Transitions of held-out settings for each point of the learning curve.
 ADAM_STATE = ("step", "exp_avg", "exp_avg_sq")
-
-
-class BadTrainingConfig(ValueError):
-    """A config has values that no training can have."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +43,9 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         if min(self.epochs, self.updates, self.batch, self.halved_every) < 1 or self.learning_rate <= 0.0:
-            raise BadTrainingConfig("epochs, updates, batch, halved_every and learning_rate of a training are above 0")
+            raise BadInput("epochs, updates, batch, halved_every and learning_rate of a training are above 0")
         if self.seed < 0:
-            raise BadTrainingConfig(f"the seed of a training must be 0 or more, not {self.seed}")
+            raise BadInput(f"the seed of a training must be 0 or more, not {self.seed}")
 
 
 def train(folder: Path, config: TrainingConfig, progress: Progress = no_progress) -> SuccessModel:
@@ -58,7 +54,7 @@ def train(folder: Path, config: TrainingConfig, progress: Progress = no_progress
     The model is from the epoch with the lowest loss on the held-out settings, because later epochs overfit and become
     overconfident. The folder then holds the model and its learning curve: loss and accuracy on learned and held-out
     settings after each epoch. A call that was stopped, or that had fewer epochs, ends with the same bytes when it is
-    repeated. `progress` receives epochs. Raises FolderMismatch, EmptyDataset, BadDataset, BadTensors.
+    repeated. `progress` receives epochs. Raises BadInput, NotFound, BadInput, BadTensors.
     """
     run = _TrainingRun(folder, config)
     file = folder / STATE
@@ -185,12 +181,12 @@ class _TrainingRun:
         return arrays
 
     def resume(self, file: Path) -> None:
-        """Restores the training that wrote a file; raises FolderMismatch, BadTensors."""
+        """Restores the training that wrote a file; raises BadInput, BadTensors."""
         about, arrays = records.read_about(file, Fit), tensors.read(file)
         expected = {"fit": asdict(self._config), "rows": len(self._data)}
         stored = {**about.fit, "epochs": self._config.epochs}  # A training with fewer epochs may continue.
         if {"fit": stored, "rows": about.rows} != expected or about.epoch > self._config.epochs:
-            raise FolderMismatch(
+            raise BadInput(
                 f"{self._folder} holds another training; remove {file.name} there, or train with its settings"
             )
         if len(about.curve) != about.epoch:

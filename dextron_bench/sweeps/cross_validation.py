@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from msgspec import field
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.methods.learners import PolicyTransfer
 from dextron_bench.reaches import sources
@@ -29,10 +30,6 @@ from dextron_bench.sweeps.execution import Resources
 from dextron_bench.training.jobs import TrainingJob
 
 TRAIN = "train"
-
-
-class NoCrossValidation(ValueError):
-    """A method that cannot learn without a subject, or a source of reaches with one subject."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +52,13 @@ class LeftOutScores(Record, frozen=True):
 def cross_validate(plan: Plan, seeds: Sequence[int], resources: Resources) -> Iterator[LeftOut]:
     """The scores of a method on each subject of `train`, sorted; what the folder of runs holds is not made again.
 
-    Raises NoCrossValidation, the errors of `resolve` and of `TrainingJob.run`.
+    Raises BadInput, the errors of `resolve` and of `TrainingJob.run`.
     """
     run = _checked(resolve(plan))
     split = load_split(run.source, TRAIN)
     subjects = sorted(set(strata.strata(split)["subject"]))
     if len(subjects) < 2:
-        raise NoCrossValidation(f"the {run.source} reaches of {TRAIN} have one subject; none can be left out")
+        raise BadInput(f"the {run.source} reaches of {TRAIN} have one subject; none can be left out")
     for number, subject in enumerate(subjects, 1):
         with resources.bar(f"{run.label} without {subject}, {number} of {len(subjects)}") as report:
             job = None
@@ -76,11 +73,9 @@ def cross_validate(plan: Plan, seeds: Sequence[int], resources: Resources) -> It
 
 def _checked(run: Run) -> Run:
     if isinstance(run.method, PolicyTransfer):
-        raise NoCrossValidation(
-            f"{run.label} plays a policy that was trained on other reaches; it learns from no subject"
-        )
+        raise BadInput(f"{run.label} plays a policy that was trained on other reaches; it learns from no subject")
     if run.source != run.plan.reaches:
-        raise NoCrossValidation(f"{run.label} is always trained on {run.source} reaches; give --reaches {run.source}")
+        raise BadInput(f"{run.label} is always trained on {run.source} reaches; give --reaches {run.source}")
     return run
 
 

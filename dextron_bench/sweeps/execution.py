@@ -46,7 +46,7 @@ class Resources:
 def execute(sweep: Sweep, file: SweepFile, most: int, resources: Resources) -> None:
     """Runs the trials that the file of a sweep lacks; after each it is written again. Failed trials are tried again.
 
-    `most` is the number of trials of a search. Raises BadSweep, FolderBusy, the errors that would end every trial
+    `most` is the number of trials of a search. Raises BadInput, Failed, the errors that would end every trial
     (NOT_OF_A_TRIAL), and the errors of `Sweep.question`.
     """
     question, flags = sweep.question(), registry.as_flags(sweep.method, sweep.settings)
@@ -73,7 +73,7 @@ def execute(sweep: Sweep, file: SweepFile, most: int, resources: Resources) -> N
 def runs_ahead(sweep: Sweep, file: SweepFile, most: int, runs: Path) -> list[list[Run]]:
     """The runs of all trials that have not ended, a group for each, of a sweep whose trials are independent.
 
-    Trials whose settings the method refuses are left out. Raises BadSweep and the errors of `Sweep.question`.
+    Trials whose settings the method refuses are left out. Raises BadInput and the errors of `Sweep.question`.
     """
     trials = file.begin(sweep.question())
     trials += [Trial(sweep.propose([Trial({})] * number)) for number in range(len(trials), sweep.trials(most))]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dextron_bench.errors import MissingPackage
 from dextron_bench.sweeps.space import Choices, Range, Space
 from dextron_bench.sweeps.trial import DONE, STOPPED, Trial
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     import optuna
 
 
-class MissingOptuna(ImportError):
+class MissingOptuna(MissingPackage):
     """Optuna is not installed."""
 
 

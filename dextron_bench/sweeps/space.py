@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
+
 DIGITS = 4  # Of a number that is drawn from a range.
-
-
-class BadSpace(ValueError):
-    """Values or a range that a setting cannot have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,17 +26,17 @@ class Choices:
         return self.values[rng.integers(len(self.values))]
 
     def index(self, stored: Any) -> int:
-        """The place of the value that a JSON file holds, where a tuple is a list; raises BadSpace."""
+        """The place of the value that a JSON file holds, where a tuple is a list; raises BadInput."""
         text = json.dumps(stored)
         for index, value in enumerate(self.values):
             if json.dumps(value) == text:
                 return index
-        raise BadSpace(f"{text} is none of the values")
+        raise BadInput(f"{text} is none of the values")
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Numbers from `low` to `high`, both included; whole numbers if both ends are. Raises BadSpace.
+    """Numbers from `low` to `high`, both included; whole numbers if both ends are. Raises BadInput.
 
     They are uniform, or with `log` their logarithm is.
     """
@@ -49,9 +47,9 @@ class Range:
 
     def __post_init__(self) -> None:
         if not -np.inf < self.low < self.high < np.inf:
-            raise BadSpace(f"the range {self.low:g}..{self.high:g} needs finite ends, the smaller one first")
+            raise BadInput(f"the range {self.low:g}..{self.high:g} needs finite ends, the smaller one first")
         if self.log and self.low <= 0:
-            raise BadSpace(f"the range {self.low:g}..{self.high:g}:log must begin above 0")
+            raise BadInput(f"the range {self.low:g}..{self.high:g}:log must begin above 0")
 
     @property
     def is_whole(self) -> bool:
@@ -82,7 +80,7 @@ def draw(space: Space, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def restored(space: Space, stored: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings that a JSON file holds, with the types that they have in the space; raises BadSpace."""
+    """The settings that a JSON file holds, with the types that they have in the space; raises BadInput."""
     return {
         name: part.values[part.index(stored[name])] if isinstance(part, Choices) else stored[name]
         for name, part in space.items()

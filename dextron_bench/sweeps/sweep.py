@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods import registry
 from dextron_bench.runs.plans import Plan, resolve
 from dextron_bench.splits.loading import load_split
@@ -23,10 +24,6 @@ from dextron_bench.sweeps.trial import Trial, TrialRecord, best
 FOLDER, FILE = "sweeps", "sweep.json"  # In the folder of runs: sweeps/<name>/sweep.json.
 VAL = "val"
 CHOICE = "The winner has the highest mean return on val. The sweep has played no other split."
-
-
-class BadSweep(ValueError):
-    """A sweep that does not exist, that has another question, or whose name no folder can have."""
 
 
 @dataclass(frozen=True)
@@ -115,9 +112,9 @@ class SweepFile:
 
     @classmethod
     def of(cls, runs: Path, name: str) -> SweepFile:
-        """The file of a sweep by its name; raises BadSweep."""
+        """The file of a sweep by its name; raises BadInput."""
         if not registry.NAME.fullmatch(name):
-            raise BadSweep(f"{name!r} is no name of a sweep: use letters, digits and . _ + -, as in 'near-and-hold'")
+            raise BadInput(f"{name!r} is no name of a sweep: use letters, digits and . _ + -, as in 'near-and-hold'")
         return cls(runs / FOLDER / name / FILE)
 
     @property
@@ -126,19 +123,19 @@ class SweepFile:
         return self.path.parent.name
 
     def read(self) -> SweepContent:
-        """Its content; raises BadSweep if there is none, DamagedFile."""
+        """Its content; raises BadInput if there is none, DamagedFile."""
         if not self.path.exists():
             names = ", ".join(file.name for file in sweep_files(self.path.parents[2])) or "none"
-            raise BadSweep(f"no sweep is called {self.name!r}; the folder has {names}")
+            raise BadInput(f"no sweep is called {self.name!r}; the folder has {names}")
         return records.read(self.path, SweepContent)
 
     def begin(self, question: Mapping[str, Any]) -> list[Trial]:
-        """The trials so far, none for a new sweep; raises BadSweep if the file has another question."""
+        """The trials so far, none for a new sweep; raises BadInput if the file has another question."""
         if not self.path.exists():
             return []
         content = self.read()
         if names := list(folder_config.differences(content.question, question)):
-            raise BadSweep(
+            raise BadInput(
                 f"{self.path.parent} holds another sweep: it differs in {' and '.join(names)}; give another --name"
             )
         return [Trial.of(trial) for trial in content.trials]

@@ -5,16 +5,14 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Sequence
 
-
-class MissingTracker(ValueError):
-    """A tracker whose package is not installed."""
+from dextron_bench.errors import MissingPackage
 
 
 def require(names: Sequence[str]) -> None:
-    """Raises MissingTracker if the package of a tracker is not installed; imports none of them."""
+    """Raises MissingPackage if the package of a tracker is not installed; imports none of them."""
     missing = [name for name in names if name != "rerun" and not _is_installed(name)]
     if missing:
-        raise MissingTracker(
+        raise MissingPackage(
             f"--tracker {missing[0]} needs the package of this name: `pip install {missing[0]}`, "
             f"or the extra: `pip install 'dextron-bench[{missing[0]}]'`"
         )

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import records
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.folders import visible
@@ -25,10 +26,6 @@ from dextron_bench.world import task
 
 CHUNK = 1 << 20  # Bytes of a file that are read at once.
 NOMINAL_STEPS = 1000  # Control steps that an epoch counts as, if a learner does not report `frames`.
-
-
-class NoTraining(ValueError):
-    """A place without the folder of a training."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +48,7 @@ class Evaluation:
 
 
 def training_folders(place: Path) -> dict[Path, tuple[int, ...]]:
-    """The folders of trainings at, beside or below a place, with their seeds; raises NoTraining.
+    """The folders of trainings at, beside or below a place, with their seeds; raises BadInput.
 
     A place is a folder of runs, of a method, of a source of reaches, of a seed, or of a training.
     """
@@ -64,7 +61,7 @@ def training_folders(place: Path) -> dict[Path, tuple[int, ...]]:
     for below in ("", "*/", "*/*/"):
         folders |= loop.training_folders(place, below)
     if not folders:
-        raise NoTraining(
+        raise BadInput(
             f"{place} holds no training; give a folder in which `dextron-bench run` trains, such as runs/rlil-0.1"
         )
     return folders

@@ -14,11 +14,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import BadInput, Failed
 from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Trainer
 from dextron_bench.storage import atomic, hashing, locks, records, tensors
 from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder, OtherForm
-from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.records import Amount, Count, Record
 from dextron_bench.training import checkpoint_list, metric_rows
@@ -29,7 +29,7 @@ JOURNALS = "journals"
 LOCK = ".locked"  # Earlier versions left a file .lock.
 
 
-class Busy(RuntimeError):
+class Busy(Failed):
     """A training that another process runs."""
 
 
@@ -133,14 +133,14 @@ class Checkpoints:
     def resume(self, trainer: Trainer, device: str) -> None:
         """Restores a trainer from the last checkpoint, and removes everything that was written after it.
 
-        Raises DamagedFile if something is missing or changed, and FolderMismatch if the training began on another
+        Raises DamagedFile if something is missing or changed, and BadInput if the training began on another
         device: its numbers differ in the last bits.
         """
         progress = self.progress()
         if not progress and len(self._snapshots()) > 1:  # One is of a first period that was interrupted.
             raise IncompleteFolder(self.folder, f"{CHECKPOINT} is missing")
         if progress and progress.device != device:
-            raise FolderMismatch(
+            raise BadInput(
                 f"{self.folder} was begun on {progress.device}: continue with --device {progress.device}, or remove it"
             )
         self._listed = self._checked(progress.epoch) if progress else {}

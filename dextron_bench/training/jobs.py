@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods import registry
 from dextron_bench.methods.learners import Learner, TrainingSetup
 from dextron_bench.reaches import sources
@@ -19,7 +20,7 @@ from dextron_bench.training.checkpoints import Checkpoints, Snapshot
 from dextron_bench.training.learning_curve import Curve, CurveFile
 
 
-class NoDevice(ValueError):
+class NoDevice(BadInput):
     """A device that this machine does not have."""
 
 
@@ -48,8 +49,8 @@ class TrainingJob:
     def run(self, seeds: Sequence[int], report: Progress = no_progress, watch: loop.Watch = loop.no_watch) -> None:
         """Trains the seeds that need it, and writes best weights and curve into the folders of their runs.
 
-        `watch` receives the learning curves as they grow. Raises what it raises, Diverged, AgentError, Busy, NoDevice,
-        FolderMismatch, DamagedFile, UnknownSplit, MissingData.
+        `watch` receives the learning curves as they grow. Raises what it raises, Failed, AgentError, Busy, NoDevice,
+        BadInput, DamagedFile, UnknownSplit, MissingData.
         """
         for seed in seeds:
             folder_config.check(self.run_folder(seed).path, registry.run_config(self.learner, self.reaches, seed))

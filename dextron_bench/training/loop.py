@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import DextronError, Failed
 from dextron_bench.methods import loading, registry
 from dextron_bench.methods.agents import AgentError, as_agent_error
 from dextron_bench.methods.learners import Learner, Trainer, TrainingSetup
@@ -30,12 +31,8 @@ Watch = Callable[[dict[int, list[CurvePoint]]], None]  # Receives the learning c
 NAME = re.compile(r"training-(\d+(?:\+\d+)*)", re.ASCII)  # Names of the folders in which seeds train.
 
 
-class StoppedEarly(Exception):
+class StoppedEarly(DextronError):
     """Raised by a `watch` to end a training before its last epoch; its checkpoint stays."""
-
-
-class Diverged(ArithmeticError):
-    """A training whose numbers are no longer finite."""
 
 
 def folder_of(base: Path, seeds: Sequence[int]) -> Path:
@@ -69,8 +66,8 @@ def train(
 ) -> Checkpoints:
     """Trains, or continues to train, until all epochs are done and the best snapshot of each seed is known.
 
-    `watch` is called when the learning curves have a new point. Raises what it raises, Diverged, AgentError, Busy,
-    FolderMismatch, DamagedFile.
+    `watch` is called when the learning curves have a new point. Raises what it raises, Failed, AgentError, Busy,
+    BadInput, DamagedFile.
     """
     checkpoints = Checkpoints(folder, seeds)
     curve = Curve(learner, checkpoints, setup.source, val, setup.threads)
@@ -175,7 +172,7 @@ class _TrainingRun:
         ]
         for row in rows:
             if names := [name for name, value in row.metrics.items() if not math.isfinite(value)]:
-                raise Diverged(self._divergence(row, names[0]))
+                raise Failed(self._divergence(row, names[0]))
         return rows
 
     def _divergence(self, row: MetricRow, name: str) -> str:

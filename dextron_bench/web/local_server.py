@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 from urllib.parse import parse_qsl, quote, unquote
 
+from dextron_bench.errors import Failed
+
 LOOPBACK = "127.0.0.1"
 NAMES = LOOPBACK, "localhost"  # Accepted host names; any other name belongs to another site (DNS rebinding).
 VIEWER = "/viewer/"
@@ -67,7 +69,7 @@ class FormSite(Site, Protocol):
         ...
 
 
-class NoPort(RuntimeError):
+class NoPort(Failed):
     """A port at which this process cannot listen."""
 
     def __init__(self, port: int, why: str) -> None:

@@ -49,7 +49,7 @@ def slot_seeds(seed: Any, slots: int) -> list[int | None]:
 
 
 def chosen_setting(options: Options) -> Setting | None:
-    """The `setting` of the options, or None if they have none. Raises SettingError."""
+    """The `setting` of the options, or None if they have none. Raises BadInput."""
     value = (options or {}).get("setting")
     return None if value is None else checked_setting(value)
 
@@ -57,7 +57,7 @@ def chosen_setting(options: Options) -> Setting | None:
 def slot_settings(options: Options, slots: int) -> list[Setting | None]:
     """The setting of each slot: the `setting` of the options for all, or the k-th of a list, which may be None.
 
-    Raises SettingError, and ValueError if a list has another length.
+    Raises BadInput, and ValueError if a list has another length.
     """
     value = (options or {}).get("setting")
     if not isinstance(value, list | tuple | np.ndarray):

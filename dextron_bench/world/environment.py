@@ -6,17 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from dextron_bench.reaches.setting import Setting, SettingError, Source, checked_setting
+from dextron_bench.errors import BadInput
+from dextron_bench.reaches.setting import Setting, Source, checked_setting
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.world import task
 
 
-class ActionError(ValueError):
-    """An invalid action; the message has its value and the valid ones."""
-
-
 def validated_action(actions: np.ndarray, shape: tuple[int, ...], ignored: np.ndarray | None = None) -> np.ndarray:
-    """The actions as 64-bit floats of that shape, in [-1, 1] (see `task.clipped`). Raises ActionError.
+    """The actions as 64-bit floats of that shape, in [-1, 1] (see `task.clipped`). Raises BadInput.
 
     It refuses other shapes and types, NaN, and every value that lies outside the range by more than `task.LEEWAY`,
     except in rows where `ignored` is true. So an action means the same in training, in evaluation and in a replay.
@@ -27,22 +24,22 @@ def validated_action(actions: np.ndarray, shape: tuple[int, ...], ignored: np.nd
             raise TypeError
         values = given.astype(np.float64)
     except (TypeError, ValueError):
-        raise ActionError(f"actions must be numbers of shape {shape}; got {actions!r}") from None
+        raise BadInput(f"actions must be numbers of shape {shape}; got {actions!r}") from None
     if values.shape != shape:
-        raise ActionError(f"actions must have shape {shape}; got {values.shape}")
+        raise BadInput(f"actions must have shape {shape}; got {values.shape}")
     clipped = task.clipped(values)
     is_invalid = np.isnan(clipped)
     if ignored is not None:
         is_invalid[ignored] = False
     invalid = values[is_invalid]
     if invalid.size:
-        raise ActionError(f"actions must lie in [-1, 1]; got {float(invalid[0])!r}")
+        raise BadInput(f"actions must lie in [-1, 1]; got {float(invalid[0])!r}")
     return clipped
 
 
 def _checked_settings(settings: object) -> list[Setting]:
     if not isinstance(settings, Iterable) or isinstance(settings, str | Mapping):
-        raise SettingError(f"settings must be a list of settings; got {settings!r}")
+        raise BadInput(f"settings must be a list of settings; got {settings!r}")
     checked = [checked_setting(setting) for setting in settings]
     if not checked:
         raise ValueError("settings is an empty list; pass at least one setting, or None to draw from the source")
@@ -55,7 +52,7 @@ class SettingQueue:
     def __init__(self, reaches: str | Source, settings: Sequence[Setting] | None = None) -> None:
         """Takes a source or its name.
 
-        A setting may be a mapping, as in an info. Raises UnknownSource, ValueError if the list is empty, SettingError
+        A setting may be a mapping, as in an info. Raises UnknownSource, ValueError if the list is empty, BadInput
         if it is no list or holds something else, and TypeError for another source.
         """
         self.source = open_source(reaches) if isinstance(reaches, str) else reaches

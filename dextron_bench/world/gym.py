@@ -87,7 +87,7 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begins the next episode, or the one of `options["setting"]`. A seed also returns to the first setting.
 
-        Raises SettingError; UnknownReach or ReachError if the source has no path for the setting.
+        Raises BadInput; UnknownReach or BadInput if the source has no path for the setting.
         """
         chosen = chosen_setting(options)
         super().reset(seed=seed_number(seed))
@@ -99,7 +99,7 @@ class GraspEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return states[0], infos.single(self._setting, self._return, "")
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Advances one control step. Raises ActionError, and ResetNeeded outside an episode."""
+        """Advances one control step. Raises BadInput, and ResetNeeded outside an episode."""
         if not self._live:
             raise ResetNeeded("no episode is running; call reset() first")
         step = self._engine.step(self._slot, validated_action(action, (1,))[None])
@@ -177,7 +177,7 @@ class GraspVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return self._states.copy(), self._info(mask, np.zeros(self.num_envs, bool))
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Advances every slot by one control step. Raises ActionError, and ResetNeeded before the first reset.
+        """Advances every slot by one control step. Raises BadInput, and ResetNeeded before the first reset.
 
         In the mode DISABLED it also raises ResetNeeded if a slot's episode is over.
         """

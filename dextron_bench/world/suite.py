@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dextron_bench.errors import MissingPackage
 from dextron_bench.reaches.reach import PALM_AHEAD, Path
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import model, simulator, task
@@ -19,7 +20,7 @@ from dextron_bench.world.environment import SettingQueue, validated_action
 ADDITION = "dm-control dm-env dm-tree lxml wrapt"
 
 
-class MissingDmControl(ImportError):
+class MissingDmControl(MissingPackage):
     """dm_control is not installed; the message says how to add it."""
 
     def __init__(self, name: str | None) -> None:
@@ -49,7 +50,7 @@ def load(
 ) -> control.Environment:
     """An environment that plays `settings` in turn, again and again, or draws settings from a source of reaches.
 
-    Takes the source or its name. Raises UnknownSource and MissingData; steps raise ActionError.
+    Takes the source or its name. Raises UnknownSource and MissingData; steps raise BadInput.
     """
     grasp = Grasp(SettingQueue(reaches, settings), np.random.default_rng(seed))
     return control.Environment(Physics.load(), grasp, n_sub_steps=model.substeps(), legacy_step=False)
@@ -124,7 +125,7 @@ class Grasp(control.Task):
         self._progress.begin(np.array([0]), physics.states(), np.array([len(self._path)]))
 
     def before_step(self, action: np.ndarray, physics: Physics) -> None:
-        """Commands the fingers and moves the hand along its path. Raises ActionError."""
+        """Commands the fingers and moves the hand along its path. Raises BadInput."""
         physics.set_control(task.commands(validated_action(action, (1,))[None])[0])
         physics.move_carrier(self._path, int(self._progress.step[0]) + 1)
 

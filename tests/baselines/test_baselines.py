@@ -11,7 +11,8 @@ import pytest
 from baselines.exp import Exp
 from baselines.floors import Nothing, Random
 from baselines.omega import OmegaAgent
-from baselines.reflex import BadDistance, Reflex
+from baselines.reflex import Reflex
+from dextron_bench.errors import BadInput
 from dextron_bench.experts.policies import Expert
 from dextron_bench.methods.agents import Agent, Privileged
 from dextron_bench.world import model, task
@@ -83,5 +84,5 @@ def test_reflex_closes_from_its_distance_on_and_does_not_reopen():
     assert played == [[-1.0, -1.0], [1.0, -1.0], [1.0, -1.0]]
     agent.reset(np.array([0]))
     assert agent.act(away)[0, 0] == -1.0
-    with pytest.raises(BadDistance, match="0 or more"):
+    with pytest.raises(BadInput, match="0 or more"):
         Reflex(near=float("nan"))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from baselines import expert_windows, openings
-from baselines.stopping import BadNumber, Stopping
+from baselines.stopping import Stopping
+from dextron_bench.errors import BadInput
 from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import TrainingSetup
@@ -52,5 +53,5 @@ def test_a_training_by_windows_plays_no_forks(tmp_path: Path, monkeypatch: pytes
 
 @pytest.mark.parametrize("more", [{"nearby": 0}, {"generated": 10}], ids=str)
 def test_other_settings_have_no_windows(more: dict[str, int]):
-    with pytest.raises(BadNumber, match="leave out --nearby and --generated"):
+    with pytest.raises(BadInput, match="leave out --nearby and --generated"):
         Stopping(labels="windows", **more)

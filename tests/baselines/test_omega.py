@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.omega import BadRule, NoModel, Omega, OmegaAgent, choose
+from baselines.omega import Omega, OmegaAgent, choose
 from dextron_bench.cli import main
+from dextron_bench.errors import BadInput
 from dextron_bench.methods import registry
 from dextron_bench.storage import hashing
 from dextron_bench.success.network import GRID, SuccessModel
@@ -122,20 +123,20 @@ def test_the_settings_name_the_model_and_another_model_is_refused(tmp_path: Path
     assert again == omega
     np.testing.assert_allclose(omega.agent(0).act(states(0.05)), 0.4)
     fixed_success_model.write(file, -0.4)
-    with pytest.raises(NoModel, match=f"has the SHA-256 {hashing.sha256(file)}, not {omega.sha256}"):
+    with pytest.raises(BadInput, match=f"has the SHA-256 {hashing.sha256(file)}, not {omega.sha256}"):
         omega.agent(0)
 
 
 def test_settings_that_are_not_possible_raise(tmp_path: Path):
-    with pytest.raises(NoModel, match=r"ships for minjerk reaches.*--model takes the file"):
+    with pytest.raises(BadInput, match=r"ships for minjerk reaches.*--model takes the file"):
         Omega().for_source("minjerk")
-    with pytest.raises(NoModel, match="No such file"):
+    with pytest.raises(BadInput, match="No such file"):
         Omega(model=str(tmp_path / "none.safetensors")).for_source("real")
-    with pytest.raises(NoModel, match=r"takes the file of a model .* or one of real, synthetic.*'nofile'"):
+    with pytest.raises(BadInput, match=r"takes the file of a model .* or one of real, synthetic.*'nofile'"):
         Omega(model="nofile").for_source("real")
-    with pytest.raises(BadRule, match="--tolerance is 2; a difference of probabilities lies between 0 and 1"):
+    with pytest.raises(BadInput, match="--tolerance is 2; a difference of probabilities lies between 0 and 1"):
         Omega(tolerance=2.0)
-    with pytest.raises(BadRule, match="--near is -1"):
+    with pytest.raises(BadInput, match="--near is -1"):
         Omega(near=-1.0)
 
 

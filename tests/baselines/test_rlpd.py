@@ -11,8 +11,9 @@ import torch
 from torch.testing import assert_close
 
 from baselines import cycle, demonstrations, rlpd
-from baselines.rlpd import BadEnsemble, Ensemble, Rlpd
+from baselines.rlpd import Ensemble, Rlpd
 from baselines.sac import Batch
+from dextron_bench.errors import BadInput
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import TrainingSetup
 from dextron_bench.reaches.setting import Setting
@@ -135,7 +136,7 @@ def test_labels_name_the_settings_that_differ_and_impossible_ones_are_refused():
     assert Rlpd().label == "rlpd"
     assert Rlpd(critics=10, updates=20, batch=256, preset="quick").label == "rlpd-10c-20u-256b-quick"
     for settings in ({"critics": 1}, {"updates": 0}, {"batch": 7}, {"batch": 0}):
-        with pytest.raises(BadEnsemble, match="give 2 critics or more"):
+        with pytest.raises(BadInput, match="give 2 critics or more"):
             Rlpd(**settings)  # type: ignore[arg-type]
 
 

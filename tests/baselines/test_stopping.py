@@ -11,7 +11,8 @@ import torch
 from torch.testing import assert_close
 
 from baselines import generated_reaches, openings, pose_features, stopping_trainer
-from baselines.stopping import BadNumber, Stopping, StoppingAgent
+from baselines.stopping import Stopping, StoppingAgent
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Episode, Openings
 from dextron_bench.experts.policies import Case, Expert
@@ -220,11 +221,11 @@ def test_it_learns_from_what_closing_can_solve_on_generated_reaches_too(
 
 
 def test_impossible_numbers_are_refused():
-    with pytest.raises(BadNumber, match="--settings is -1"):
+    with pytest.raises(BadInput, match="--settings is -1"):
         Stopping(settings=-1)
-    with pytest.raises(BadNumber, match="--nearby is -2"):
+    with pytest.raises(BadInput, match="--nearby is -2"):
         Stopping(nearby=-2)
-    with pytest.raises(BadNumber, match="--generated is -1"):
+    with pytest.raises(BadInput, match="--generated is -1"):
         Stopping(generated=-1)
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from dextron_bench.catalogue import episodes
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import tables
 
 
@@ -42,7 +43,7 @@ def test_an_episode_is_found_again_with_its_actions(runs: Path):
 def test_a_run_that_has_changed_is_refused(runs: Path):
     changed = episodes.read([runs]).iloc[[0]].copy()
     changed["return"] = 3.0
-    with pytest.raises(episodes.NoEpisodes, match="has changed since its episodes were read"):
+    with pytest.raises(BadInput, match="has changed since its episodes were read"):
         episodes.with_actions(changed)
 
 

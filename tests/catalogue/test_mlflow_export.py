@@ -11,6 +11,7 @@ import pytest
 
 from dextron_bench.catalogue import mlflow_export
 from dextron_bench.catalogue.exported_runs import ExportedRun, Metric
+from dextron_bench.errors import BadInput, Failed
 from dextron_bench.storage.run_times import RunTimes
 
 BEGAN, ENDED = datetime(2026, 1, 1, 1, tzinfo=UTC), datetime(2026, 1, 1, 2, tzinfo=UTC)
@@ -87,14 +88,14 @@ def test_an_export_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest
 @pytest.mark.usefixtures("needs_mlflow")
 def test_a_value_that_mlflow_refuses_is_one_error(tmp_path: Path):
     refused = ExportedRun("a", "FINISHED", RunTimes(), metrics=[Metric("a/../b", 1.0)])
-    with pytest.raises(mlflow_export.NotWritten, match=r"cannot write the export: .*a/\.\./b"):
+    with pytest.raises(Failed, match=r"cannot write the export: .*a/\.\./b"):
         mlflow_export.write([refused], tmp_path / "exported")
 
 
 def test_a_folder_that_holds_something_is_refused(tmp_path: Path):
     (tmp_path / "exported").mkdir()
     (tmp_path / "exported/mine").touch()
-    with pytest.raises(mlflow_export.NotEmpty, match="exported is not empty; choose another folder with --into"):
+    with pytest.raises(BadInput, match="exported is not empty; choose another folder with --into"):
         mlflow_export.write([DONE], tmp_path / "exported")
 
 

@@ -11,8 +11,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 from dextron_bench.catalogue import episodes, rerecording, selection
-from dextron_bench.catalogue.rerecording import Unplayable
 from dextron_bench.catalogue.selection import EpisodeFilter
+from dextron_bench.errors import BadInput
 from dextron_bench.runs import execution, run_files
 from dextron_bench.runs.plans import Plan, resolve
 from dextron_bench.storage import atomic
@@ -104,13 +104,13 @@ def test_without_actions_only_existing_recordings_are_available(tmp_path: Path):
     table = pd.read_parquet(folder / "episodes.parquet")
     run_files.store_episodes(RunFolder(folder), table.drop(columns="actions"))
     assert len(rerecorded(folder, EpisodeFilter(row=(0,)))) == 2
-    with pytest.raises(Unplayable) as caught:
+    with pytest.raises(BadInput) as caught:
         rerecorded(folder)
     assert str(caught.value).startswith(
         f"test row 1 of {folder} has no recording, and its actions were not kept; remove"
     )
     (folder / "recordings" / "test-0000.rrd").write_bytes(b"")
-    with pytest.raises(Unplayable, match="has a recording that is empty, and its actions were not kept"):
+    with pytest.raises(BadInput, match="has a recording that is empty, and its actions were not kept"):
         rerecorded(folder, EpisodeFilter(row=(0,)))
     (folder / "episodes.parquet").unlink()  # As the message advises.
     assert len(rerecorded(play(tmp_path))) == 3
@@ -121,7 +121,7 @@ def test_an_episode_that_differs_when_replayed_is_not_recorded(tmp_path: Path, c
     folder = play(tmp_path)
     change(folder, **{column: value})
     with pytest.raises(
-        Unplayable,
+        BadInput,
         match=r"test row 0 of .* (differs when it is played again: return .* not |is no setting of this split)",
     ):
         rerecorded(folder, EpisodeFilter(split=("test",), row=(0,)))
@@ -131,11 +131,11 @@ def test_an_episode_that_differs_when_replayed_is_not_recorded(tmp_path: Path, c
 def test_other_physics_and_an_older_split_are_refused(tmp_path: Path):
     folder = play(tmp_path)
     change(folder, digest="0" * 64)
-    with pytest.raises(Unplayable, match="is of an older version of the split"):
+    with pytest.raises(BadInput, match="is of an older version of the split"):
         rerecorded(folder)
     config = folder / "config.json"
     config.write_text(json.dumps(json.loads(config.read_text()) | {"physics": "other"}))
-    with pytest.raises(Unplayable, match="was played with other physics than this version's; remove"):
+    with pytest.raises(BadInput, match="was played with other physics than this version's; remove"):
         rerecorded(folder)
 
 

@@ -11,7 +11,8 @@ import pytest
 from dextron_bench.catalogue import run_catalogue, run_search
 from dextron_bench.catalogue.expressions import BadExpression
 from dextron_bench.catalogue.run_catalogue import Entry
-from dextron_bench.catalogue.run_search import BadSearch, RunFilter
+from dextron_bench.catalogue.run_search import RunFilter
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.runs import annotations
 from dextron_bench.storage.run_folder import RunFolder
 
@@ -132,7 +133,7 @@ def test_settings_that_differ(runs: Path):
 
 @pytest.mark.parametrize("wrong", [{"since": "yesterday"}, {"setting": ("near",)}])
 def test_impossible_filters_are_refused(wrong: dict):
-    with pytest.raises(BadSearch):
+    with pytest.raises(BadInput):
         RunFilter(**wrong)
 
 
@@ -155,15 +156,13 @@ def test_a_name_that_no_run_or_several_have_is_refused(runs: Path):
     write.config.write_text("{}")
     entries = run_catalogue.entries(runs)
     assert run_catalogue.find(entries, "mine/synthetic").reaches == "synthetic"
-    with pytest.raises(
-        run_catalogue.UnknownRun, match="several runs are called 'mine'; choose mine/real or mine/synth"
-    ):
+    with pytest.raises(NotFound, match="several runs are called 'mine'; choose mine/real or mine/synth"):
         run_catalogue.find(entries, "mine")
-    with pytest.raises(run_catalogue.UnknownRun, match="no run is called 'yours'; the folder has learner/real, "):
+    with pytest.raises(NotFound, match="no run is called 'yours'; the folder has learner/real, "):
         run_catalogue.find(entries, "yours")
 
 
 @pytest.mark.parametrize("notes", [{"tags": ("a b",)}, {"tags": ("",)}, {"note": "x" * 2001}])
 def test_bad_notes_are_refused(notes: dict):
-    with pytest.raises(annotations.BadNote):
+    with pytest.raises(BadInput):
         annotations.Notes(**notes)

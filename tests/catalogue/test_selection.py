@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from dextron_bench.catalogue import selection
-from dextron_bench.catalogue.episodes import NoEpisodes
-from dextron_bench.catalogue.selection import BadFilter, EpisodeFilter
+from dextron_bench.catalogue.selection import EpisodeFilter
+from dextron_bench.errors import BadInput
 
 COLUMNS = ["method", "reaches", "seed", "split", "row", "return", "steps", "cause"]
 TABLE = pd.DataFrame(
@@ -64,14 +64,14 @@ def test_a_filter_selects_these_episodes(settings: dict[str, Any], rows: list[in
     ],
 )
 def test_an_unknown_value_is_answered_with_the_valid_ones(settings: dict[str, Any], message: str):
-    with pytest.raises(NoEpisodes) as caught:
+    with pytest.raises(BadInput) as caught:
         selection.select(TABLE, EpisodeFilter(**settings))
     assert str(caught.value).startswith(message)
 
 
 @pytest.mark.parametrize("count", [0, -1])
 def test_a_filter_for_fewer_than_one_episode_is_refused(count: int):
-    with pytest.raises(BadFilter, match=f"--best {count}: select 1 episode or more"):
+    with pytest.raises(BadInput, match=f"--best {count}: select 1 episode or more"):
         EpisodeFilter(best=count)
 
 
@@ -81,8 +81,8 @@ def test_recordings_at_files_and_below_folders_are_listed_once(tmp_path: Path):
     for file in files:
         file.touch()
     assert selection.recordings([files[0], tmp_path]) == files
-    with pytest.raises(NoEpisodes, match=r"empty does not exist; "):
+    with pytest.raises(BadInput, match=r"empty does not exist; "):
         selection.recordings([tmp_path / "empty"])
     (tmp_path / "empty" / "folder.rrd").mkdir(parents=True)
-    with pytest.raises(NoEpisodes, match=r"no recordings at .*empty"):
+    with pytest.raises(BadInput, match=r"no recordings at .*empty"):
         selection.recordings([tmp_path, tmp_path / "empty"])

@@ -13,7 +13,8 @@ import pytest
 
 from dextron_bench.cli import main
 from dextron_bench.cluster import inputs, installation, ray_cluster, worker
-from dextron_bench.cluster.tasks import BadCluster, ResultFile, Task, content_hash, write_files
+from dextron_bench.cluster.tasks import ResultFile, Task, content_hash, write_files
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic
 from tests.helpers.immediate_cluster import ImmediateCluster, performed
 
@@ -146,7 +147,7 @@ def test_a_large_task_fits_no_small_node(tmp_path: Path, monkeypatch: pytest.Mon
         monkeypatch.setattr(cluster, "_ray", Ray, raising=False)
         assert cluster._room() == room
     cluster.threads = 4
-    with pytest.raises(BadCluster, match="a task needs 4 processors, and the largest node has 2"):
+    with pytest.raises(BadInput, match="a task needs 4 processors, and the largest node has 2"):
         cluster._room()
 
 

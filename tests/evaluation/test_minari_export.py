@@ -14,6 +14,7 @@ import torch
 
 from baselines.floors import Nothing
 from dextron_bench.cli import main
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation import minari_export
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
@@ -115,16 +116,16 @@ def test_a_failed_export_raises_and_leaves_nothing(tmp_path: Path, monkeypatch: 
         def act(self, states: np.ndarray) -> np.ndarray:
             return np.full((len(states), 1), np.nan)
 
-    with pytest.raises(minari_export.BadExport, match=r"nan failed in row 0 of 'train': action is nan"):
+    with pytest.raises(BadInput, match=r"nan failed in row 0 of 'train': action is nan"):
         write(tmp_path, [minari_export.Player("nan", SendsNan())])
     assert not list(tmp_path.rglob("*brief*"))
     write(tmp_path, [STILL], rows=1)
-    with pytest.raises(minari_export.BadExport, match="already exists; remove it, or choose another --name"):
+    with pytest.raises(BadInput, match="already exists; remove it, or choose another --name"):
         write(tmp_path, [STILL], rows=1)
     for name in ("../up-v0", "brief", "a b-v0", "/brief-v0"):
-        with pytest.raises(minari_export.BadExport, match="names no data set"):
+        with pytest.raises(BadInput, match="names no data set"):
             minari_export.Export(name, SPLIT, 1, [STILL])
-    with pytest.raises(minari_export.BadExport, match="at least one row"):
+    with pytest.raises(BadInput, match="at least one row"):
         minari_export.Export(NAME, SPLIT, 0, [STILL])
     monkeypatch.setitem(sys.modules, "minari.dataset.minari_storage", None)
     with pytest.raises(minari_export.MissingMinari, match="pip install"):

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.episodes import fingerprint
 from dextron_bench.evaluation.replay import replay
-from dextron_bench.reaches.setting import SettingError, plain
+from dextron_bench.reaches.setting import plain
 from tests.helpers.short_reaches import SETTINGS, SOURCE, actions, played
 
 ROUND = np.round(actions(0)[:, 0], 1)
@@ -50,5 +51,5 @@ def test_what_is_no_sequence_of_numbers_is_refused(wrong: Any):
 
 def test_settings_may_be_those_of_an_info_and_others_are_refused():
     assert dict(replay(SOURCE, [plain(SETTINGS[0])], [ROUND], threads=1))[0].setting == SETTINGS[0]  # pyright: ignore
-    with pytest.raises(SettingError, match="must be a dextron_bench Setting"):
+    with pytest.raises(BadInput, match="must be a dextron_bench Setting"):
         replay(SOURCE, [3], [ROUND])  # pyright: ignore

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import database
-from dextron_bench.experts.database import DamagedDatabase
 from dextron_bench.experts.montecarlo import Search
 from tests.helpers.short_reaches import SOURCE
 
@@ -88,7 +88,7 @@ def test_the_digest_depends_on_the_order_of_rows_and_on_every_bit(draws: pd.Data
 
 
 def complaint(file: Path) -> str:
-    with pytest.raises(DamagedDatabase) as caught:
+    with pytest.raises(BadInput) as caught:
         database.load(file)
     assert str(file) in str(caught.value)
     assert "make it again" in str(caught.value)
@@ -138,5 +138,5 @@ def test_a_search_extends_only_a_database_of_the_same_physics(monkeypatch: pytes
     summary = database.load_shipped("synthetic")[1]
     database.check_physics(summary)
     monkeypatch.setattr(database.model, "mjcf_hash", lambda: "f" * 64)
-    with pytest.raises(database.OtherPhysics, match="this version has ffffffff; search again without --extend"):
+    with pytest.raises(BadInput, match="this version has ffffffff; search again without --extend"):
         database.check_physics(summary)

@@ -13,13 +13,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import blocks, database, montecarlo, outcomes, policies
 from dextron_bench.experts.blocks import Tally
 from dextron_bench.experts.montecarlo import Search
 from dextron_bench.experts.search_work import SearchWork
 from dextron_bench.reaches import setting
-from dextron_bench.storage import block_work, folder_config, provenance, shares, tables
+from dextron_bench.storage import block_work, provenance, tables
 from dextron_bench.storage.shares import Share
 from dextron_bench.world.engine import Engine
 from tests.helpers.short_reaches import SOURCE
@@ -105,7 +106,7 @@ def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: P
             assert search_share(part, f"{index}/{of}") > 0
         for index in range(of):
             shutil.copytree(tmp_path / f"part{index}", merged, dirs_exist_ok=True)
-        with suppress(shares.MissingPieces):
+        with suppress(NotFound):
             work_in(merged).check_complete()
             break
     monkeypatch.setattr(outcomes, "play_blocks", nothing_left)
@@ -117,10 +118,10 @@ def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: P
 
 @pytest.mark.usefixtures("quick_episodes")
 def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
-    with pytest.raises(shares.MissingPieces, match=r"lacks the blocks from 000000 on: .* have 0 of 3 rows"):
+    with pytest.raises(NotFound, match=r"lacks the blocks from 000000 on: .* have 0 of 3 rows"):
         work_in(tmp_path).check_complete()
     count = search_share(tmp_path, "1/2")
-    with pytest.raises(shares.MissingPieces, match=rf"lacks {count} of {2 * count} pieces: block 000000"):
+    with pytest.raises(NotFound, match=rf"lacks {count} of {2 * count} pieces: block 000000"):
         work_in(tmp_path).check_complete()
 
 
@@ -174,14 +175,14 @@ def test_a_search_continues_from_the_kept_rows_of_a_database(tmp_path):
     work_in(tmp_path / "second").restore(kept(first), count)
     whole = search(tmp_path / "first", rows=3)
     pd.testing.assert_frame_equal(kept(search(tmp_path / "second", rows=3)), kept(whole))
-    with pytest.raises(folder_config.FolderMismatch, match="row 0 of the database"):
+    with pytest.raises(BadInput, match="row 0 of the database"):
         work_in(tmp_path / "other", search=Search("brief", 4, 3, 4)).restore(kept(first), count)
 
 
 @pytest.mark.usefixtures("quick_episodes")
 def test_a_folder_holds_one_search(tmp_path):
     search(tmp_path, rows=1)
-    with pytest.raises(folder_config.FolderMismatch, match="holds another search"):
+    with pytest.raises(BadInput, match="holds another search"):
         work_in(tmp_path, 1, Search("brief", seed=4, experts=3, block=4)).run()
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.leaderboard import add, build, verify_board
 from dextron_bench.recording import read_safely
-from dextron_bench.submissions import entry
 from dextron_bench.world import task
 from tests.helpers import tiny_benchmark
 from tests.helpers.forged_bundles import Forgery
@@ -21,7 +21,7 @@ from tests.helpers.forged_bundles import Forgery
 )
 def test_names_that_equal_or_resemble_another_are_refused(name: str, tmp_path: Path):
     (tmp_path / "results" / "first" / "real" / "seed0").mkdir(parents=True)
-    with pytest.raises(entry.BadSubmission):
+    with pytest.raises(BadInput):
         add.check_name(name, "synthetic", tmp_path, replace=True)
     add.check_name("first-of-mine", "synthetic", tmp_path, replace=False)
 

@@ -9,6 +9,7 @@ import pytest
 from dextron_bench import recording
 from dextron_bench.catalogue import episodes
 from dextron_bench.cli import main
+from dextron_bench.errors import BadInput
 from dextron_bench.leaderboard import highlights
 from dextron_bench.success import network
 from tests.helpers import fixed_success_model
@@ -61,5 +62,5 @@ def test_without_a_model_there_are_only_successes_and_failures(runs: Path, monke
 
 
 def test_a_split_that_no_run_played_is_an_error(runs: Path):
-    with pytest.raises(episodes.NoEpisodes, match=r"no run in .* played open of synthetic reaches"):
+    with pytest.raises(BadInput, match=r"no run in .* played open of synthetic reaches"):
         highlights.choose(runs, ["synthetic"], "open", rows=100)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods import weights
 from dextron_bench.storage import tensors
 
@@ -22,7 +23,7 @@ def test_metadata_names_installed_methods_only_and_imports_nothing(
     method = form.format(here=tmp_path) if isinstance(form, str) else form
     file = tmp_path / "weights.safetensors"
     tensors.write(file, {"a": np.zeros(1)}, {"method": method, "settings": {}})
-    with pytest.raises(weights.BadWeights, match="which is not installed"):
+    with pytest.raises(BadInput, match="which is not installed"):
         weights.load_agent_from_file(file)
     assert not (tmp_path / "ran").exists()
 
@@ -30,5 +31,5 @@ def test_metadata_names_installed_methods_only_and_imports_nothing(
 def test_settings_that_are_not_settings_are_refused(tmp_path: Path):
     file = tmp_path / "weights.safetensors"
     tensors.write(file, {"a": np.zeros(1)}, {"method": "rl", "settings": ["preset"]})
-    with pytest.raises(weights.BadWeights, match="which method"):
+    with pytest.raises(BadInput, match="which method"):
         weights.load_agent_from_file(file)

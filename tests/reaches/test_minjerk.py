@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import policies
 from dextron_bench.reaches.minjerk import (
     LIFT_STEPS,
@@ -17,7 +18,7 @@ from dextron_bench.reaches.minjerk import (
     carrier_positions,
     minimum_jerk_leg,
 )
-from dextron_bench.reaches.reach import ReachError, palm_centre
+from dextron_bench.reaches.reach import palm_centre
 from dextron_bench.reaches.setting import Setting, UnknownReach
 from dextron_bench.reaches.sources import open_source
 from dextron_bench.world import task
@@ -62,7 +63,7 @@ def test_larger_numbers_are_valid_and_other_names_are_not():
 
 @pytest.mark.parametrize("noise", [(0.01, 0.0, 0.0), (0.0, -0.01, 0.0), (0.0, 0.0, 0.5)])
 def test_offsets_and_noise_are_refused(noise: tuple[float, float, float]):
-    with pytest.raises(ReachError, match="set all three to 0"):
+    with pytest.raises(BadInput, match="set all three to 0"):
         MinjerkSource().path(Setting("minjerk-000001", *noise))
 
 

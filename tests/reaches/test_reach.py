@@ -7,18 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches import rotation
-from dextron_bench.reaches.reach import (
-    PALM_AHEAD,
-    PALM_CENTRE,
-    Curve,
-    Reach,
-    ReachError,
-    clean,
-    palm_centre,
-    path,
-    scaled_duration,
-)
+from dextron_bench.reaches.reach import PALM_AHEAD, PALM_CENTRE, Curve, Reach, clean, palm_centre, path, scaled_duration
 from dextron_bench.reaches.recorded.cache import load_reaches
 from dextron_bench.reaches.setting import Source
 
@@ -151,7 +142,7 @@ def test_paths_are_rounded_to_nanometres_and_reproducible():
 
 def test_noise_that_makes_a_reach_faster_than_the_recording_is_refused():
     assert len(path(turning_reach(), 0.0, 0.0, -2.5)) == 51
-    with pytest.raises(ReachError, match=r"reach turning last 0.92 s, less than the recorded 1.00 s"):
+    with pytest.raises(BadInput, match=r"reach turning last 0.92 s, less than the recorded 1.00 s"):
         path(turning_reach(), 0.0, 0.0, -2.6)
 
 

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 
 import dextron_bench
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.reach import scaled_duration
-from dextron_bench.reaches.setting import LIMITS, OFFSET, Setting, SettingError, UnknownReach, from_frame, to_frame
+from dextron_bench.reaches.setting import LIMITS, OFFSET, Setting, UnknownReach, from_frame, to_frame
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 DATA = Path(dextron_bench.__file__).parent / "data"
@@ -44,7 +45,7 @@ def test_the_error_for_an_unknown_reach_gives_examples_of_names():
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 10.5, -1e6, "0", None, 1j])
 def test_a_noise_that_no_episode_can_show_is_refused(value: object):
     """A duration noise of 1e6 made a path of 40 million poses."""
-    with pytest.raises(SettingError, match=r"duration_noise of a setting must be a number in \[-10, 10\]; got"):
+    with pytest.raises(BadInput, match=r"duration_noise of a setting must be a number in \[-10, 10\]; got"):
         Setting("a", 0.0, 0.0, value)  # pyright: ignore[reportArgumentType]
 
 
@@ -53,16 +54,16 @@ def test_a_noise_that_no_episode_can_show_is_refused(value: object):
 def test_an_offset_that_is_not_finite_or_off_the_table_is_refused(place: int, value: float):
     offsets = [0.0, 0.0]
     offsets[place] = value
-    with pytest.raises(SettingError, match=rf"offset_{'xy'[place]} of a setting .*; got {value}"):
+    with pytest.raises(BadInput, match=rf"offset_{'xy'[place]} of a setting .*; got {value}"):
         Setting("a", offsets[0], offsets[1], 0.0)
 
 
 def test_a_table_with_a_number_that_is_missing_is_refused():
     table = to_frame(SETTINGS)
     table.loc[2, "offset_y"] = np.nan
-    with pytest.raises(SettingError, match="offset_y"):
+    with pytest.raises(BadInput, match="offset_y"):
         from_frame(table)
-    with pytest.raises(SettingError, match="the reach of a setting must be a name; got 7"):
+    with pytest.raises(BadInput, match="the reach of a setting must be a name; got 7"):
         Setting(7, 0.0, 0.0, 0.0)  # pyright: ignore[reportArgumentType]
 
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from dextron_bench.errors import BadInput, Failed
 from dextron_bench.recording import film as recording_film
-from dextron_bench.recording.film import BadFilmStyle, FilmStyle, NoEncoder
+from dextron_bench.recording.film import FilmStyle
 from dextron_bench.world import model
 from dextron_bench.world.rendering import renderer
 
@@ -89,7 +90,7 @@ def test_slow_motion_takes_longer(tmp_path: Path):
     ],
 )
 def test_an_impossible_style_is_refused(style: dict[str, float], message: str):
-    with pytest.raises(BadFilmStyle) as caught:
+    with pytest.raises(BadInput) as caught:
         FilmStyle(**style)  # pyright: ignore[reportArgumentType]
     assert str(caught.value).startswith(message)
 
@@ -101,7 +102,7 @@ def test_an_unknown_camera_lists_the_cameras():
 
 def test_without_an_encoder_the_error_says_how_to_install_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(NoEncoder, match=r"`pip install av`; or write a \.gif"):
+    with pytest.raises(Failed, match=r"`pip install av`; or write a \.gif"):
         recording_film.mp4(tmp_path / "film.mp4", lifting(3), SMALL)
 
 

@@ -9,6 +9,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from dextron_bench import recording
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.replay import replay
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
@@ -36,6 +37,6 @@ def test_each_side_has_a_scene_and_lines(tmp_path: Path):
 
 def test_different_settings_are_refused(tmp_path: Path):
     first, second = recorded(tmp_path / "1.rrd", 0, 0.5, "bc"), recorded(tmp_path / "2.rrd", 1, 0.5, "bc")
-    with pytest.raises(recording.UnequalSettings, match="take two of the same row"):
+    with pytest.raises(BadInput, match="take two of the same row"):
         recording.write_pair(tmp_path / "both.rrd", first, second)
     assert not (tmp_path / "both.rrd").exists()

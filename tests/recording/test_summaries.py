@@ -15,6 +15,7 @@ import pytest
 import rerun as rr
 
 from dextron_bench import recording
+from dextron_bench.errors import Failed
 from dextron_bench.recording import reader_process
 from dextron_bench.recording.summaries import NEEDED
 from tests.helpers import many_processors
@@ -152,7 +153,7 @@ def test_a_reader_that_does_not_start_is_an_error(whole: Path, tmp_path: Path, m
     script.write_text("raise SystemExit('no rerun here')")
     monkeypatch.setattr(reader_process, "__file__", str(script))
     with pytest.raises(
-        recording.ReaderError,
+        Failed,
         match="recordings cannot be read: the process that reads files cannot start: no rerun here",
     ):
         damages([whole])

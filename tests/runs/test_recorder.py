@@ -13,11 +13,12 @@ from pathlib import Path
 import pytest
 
 from dextron_bench import recording
+from dextron_bench.errors import Failed
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.recording.rrd_file import UnwritableRecording
 from dextron_bench.runs import recorder
-from dextron_bench.runs.recorder import LostProcess, Recorder
+from dextron_bench.runs.recorder import Recorder
 from tests.helpers.short_reaches import SETTINGS, SOURCE, actions, played
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS[:4]]
@@ -78,7 +79,7 @@ def test_a_process_that_was_killed_is_named(tmp_path: Path, two: Recorder):
     for process in multiprocessing.active_children():
         process.kill()
         process.join()
-    with pytest.raises(LostProcess, match=r"has ended; run the command again, with --threads 1"):
+    with pytest.raises(Failed, match=r"has ended; run the command again, with --threads 1"):
         write_all(two, tmp_path)
 
 

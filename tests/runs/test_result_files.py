@@ -11,9 +11,9 @@ import pytest
 from msgspec import to_builtins
 from msgspec.structs import replace
 
+from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.results import Result, scores_by_split
 from dextron_bench.runs import result_files
-from dextron_bench.runs.result_files import UnknownResult
 from dextron_bench.storage import records
 from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.provenance import Provenance
@@ -98,12 +98,12 @@ def test_a_path_finds_a_result_a_run_a_source_or_a_method(runs: Path, path: str,
 
 
 def test_an_unknown_name_is_answered_with_the_valid_ones(runs: Path):
-    with pytest.raises(UnknownResult) as caught:
+    with pytest.raises(NotFound) as caught:
         result_files.find("bcc", runs)
     assert str(caught.value) == (
         f"no result of 'bcc': {runs} has bc, and published results are bc, rl; give one of them, or the path of a run"
     )
-    with pytest.raises(UnknownResult, match=r"has none, and published results are bc, rl"):
+    with pytest.raises(NotFound, match=r"has none, and published results are bc, rl"):
         result_files.find("runs/no/where", runs / "none")
 
 
@@ -111,7 +111,7 @@ def test_a_folder_with_two_methods_is_refused(runs: Path):
     file = write(runs / "mixed", "bc", 0).parent
     file.rename(runs / "mixed" / "seed0")
     write(runs / "other", "rl", 1).parent.rename(runs / "mixed" / "seed1")
-    with pytest.raises(UnknownResult, match=r"mixed' holds results of bc, rl; give one of them"):
+    with pytest.raises(NotFound, match=r"mixed' holds results of bc, rl; give one of them"):
         result_files.find(str(runs / "mixed"), runs)
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.runs.plans import Plan
 from dextron_bench.storage.atomic import DamagedFile
-from dextron_bench.storage.folder_config import FolderMismatch
 from tests.helpers.tiny_runs import constant_agent, execute
 
 
@@ -19,7 +19,7 @@ def test_changed_code_in_the_same_folder_is_a_mismatch(tmp_path: Path):
     execute(tmp_path, plan)
     constant_agent(tmp_path, "0.5")
     with pytest.raises(
-        FolderMismatch,
+        BadInput,
         match=r"seed0 holds another run: it differs in code \(sha256\); remove it, or choose",
     ):
         execute(tmp_path, plan)
@@ -28,7 +28,7 @@ def test_changed_code_in_the_same_folder_is_a_mismatch(tmp_path: Path):
 def test_another_method_of_the_same_name_is_a_mismatch(tmp_path: Path):
     execute(tmp_path, Plan("nothing", "synthetic", ("open",), 0))
     spec = constant_agent(tmp_path, "0.0", name="nothing")
-    with pytest.raises(FolderMismatch, match="differs in code"):
+    with pytest.raises(BadInput, match="differs in code"):
         execute(tmp_path, Plan(spec, "synthetic", ("open",), 0))
 
 
@@ -36,7 +36,7 @@ def test_other_physics_in_the_same_folder_is_a_mismatch(tmp_path: Path):
     plan = Plan("nothing", "synthetic", ("open",), 0)
     config = execute(tmp_path, plan) / "config.json"
     config.write_text(json.dumps(json.loads(config.read_text()) | {"physics": "other"}))
-    with pytest.raises(FolderMismatch, match="differs in physics"):
+    with pytest.raises(BadInput, match="differs in physics"):
         execute(tmp_path, plan)
 
 

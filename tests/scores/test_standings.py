@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from msgspec.structs import replace
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.results import Result
 from dextron_bench.scores import standings
 from dextron_bench.splits import strata
@@ -107,14 +108,12 @@ def test_the_interquartile_mean_of_a_shipped_split_is_taken_over_its_regions():
 
 
 def test_results_of_unequal_length_are_refused():
-    with pytest.raises(
-        standings.UnevenResults, match="test of real, version aaaaaaaa, have different numbers of rows: 1, 2"
-    ):
+    with pytest.raises(BadInput, match="test of real, version aaaaaaaa, have different numbers of rows: 1, 2"):
         standings.table([result("a", 0, [1.0]), result("b", 0, [1.0, 2.0])])
 
 
 def test_results_with_fewer_rows_than_the_shipped_split_are_refused():
-    with pytest.raises(standings.UnevenResults, match="have different numbers of rows: 2, 500"):
+    with pytest.raises(BadInput, match="have different numbers of rows: 2, 500"):
         standings.table([result("a", 0, [1.0, 2.0], load_split("real", "test").digest)])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.splits import bottles, loading, tracks
 from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.world.bottles import model_bottle
@@ -102,5 +103,5 @@ def test_the_tables_are_read_as_splits(tmp_path: Path, monkeypatch: pytest.Monke
         loading.load_split("synthetic", "hard+bottle-mass")
     changed = pd.read_parquet(tmp_path / "bottles-synthetic.parquet").assign(mass=0.3)
     monkeypatch.setattr(loading, "_table", lambda *_: changed)
-    with pytest.raises(loading.DamagedSplit):
+    with pytest.raises(BadInput):
         loading.load_split("synthetic", "test+bottle-mass")

@@ -7,13 +7,14 @@ import pandas as pd
 import pytest
 
 from dextron_bench.cli import main
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.splits import building, building_minjerk
-from dextron_bench.splits.building import Sizes, TooFewRows
+from dextron_bench.splits.building import Sizes
 from dextron_bench.splits.loading import cases_from_frame, split_digest
 from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.world.engine import Engine
@@ -96,7 +97,7 @@ def test_equal_seeds_give_equal_splits(database, parts):
 
 
 def test_a_database_that_is_too_small_raises(database):
-    with pytest.raises(TooFewRows, match="needs 20 solved settings"):
+    with pytest.raises(BadInput, match="needs 20 solved settings"):
         building.partition(Strata(), database.head(60), 0, SIZES, None)
 
 
@@ -132,7 +133,7 @@ def test_the_expert_of_minjerk_solves_all_rows_and_the_order_is_drawn(minjerk):
 
 def test_unsolved_minjerk_reaches_are_skipped(monkeypatch):
     monkeypatch.setattr(building_minjerk, "EXPERT", policies.Expert(2.0, 0.9))  # Hits the bottle with a closed hand.
-    with pytest.raises(TooFewRows, match="the splits need 1 solved minjerk reaches and there are 0"):
+    with pytest.raises(BadInput, match="the splits need 1 solved minjerk reaches and there are 0"):
         building_minjerk.first_solved(MinjerkSource(), np.arange(4), 1, Engine(4, 1), batch=2)
 
 

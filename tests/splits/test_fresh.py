@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import branching
 from dextron_bench.experts.branching import ExpertBatch, Outcomes
@@ -87,7 +88,7 @@ def test_the_seed_depends_on_the_submission_and_on_the_beacon():
 
 @pytest.mark.parametrize("name", ["open", "train"])
 def test_splits_that_no_search_draws_are_refused(name: str):
-    with pytest.raises(fresh.NoFreshSettings, match="is not drawn by a search"):
+    with pytest.raises(BadInput, match="is not drawn by a search"):
         fresh.draw("synthetic", name, 0, ENGINE)
 
 

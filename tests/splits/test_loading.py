@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import policies
 from dextron_bench.splits.loading import (
-    DamagedSplit,
     UnknownSplit,
     all_splits,
     known_splits,
@@ -41,7 +41,7 @@ def replace(folder: Path, rows: pd.DataFrame) -> None:
 
 
 def complaint() -> str:
-    with pytest.raises(DamagedSplit) as caught:
+    with pytest.raises(BadInput) as caught:
         load_split("synthetic", "test")
     assert "\n" not in str(caught.value)
     assert "'synthetic'" in str(caught.value)
@@ -110,7 +110,7 @@ def test_a_cut_and_a_missing_file_raise(folder: Path):
 @pytest.mark.parametrize("text", ["{", ""])
 def test_a_damaged_catalogue_raises(folder: Path, text: str):
     (folder / "splits.json").write_text(text)
-    with pytest.raises(DamagedSplit, match="catalogue of splits cannot be read"):
+    with pytest.raises(BadInput, match="catalogue of splits cannot be read"):
         known_splits("synthetic")
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 import dextron_bench
+from dextron_bench.errors import NotFound
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.splits.loading import Split
-from dextron_bench.splits.rows import Rows, UnknownRow
+from dextron_bench.splits.rows import Rows
 from dextron_bench.splits.tracks import TRACKS
 from dextron_bench.world.bottle import Bottle
 
@@ -39,9 +40,9 @@ def test_rows_keep_their_order_their_track_and_their_bottles():
 
 
 def test_a_row_that_does_not_exist_is_refused():
-    with pytest.raises(UnknownRow, match=r"test\+x of synthetic reaches has rows 0 to 2, not 3"):
+    with pytest.raises(NotFound, match=r"test\+x of synthetic reaches has rows 0 to 2, not 3"):
         SPLIT.rows([3])
-    with pytest.raises(UnknownRow):
+    with pytest.raises(NotFound):
         SPLIT.rows([-1])
     with pytest.raises(ValueError, match="3 cases cannot have 1 bottles"):
         Rows(cases=CASES, bottles=BOTTLES[:1])

@@ -4,13 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import outcomes
 from dextron_bench.experts.blocks import DamagedBlock
 from dextron_bench.reaches import setting
 from dextron_bench.reaches.minjerk import MinjerkSource
 from dextron_bench.splits import scanning
 from dextron_bench.splits.scanning import Scanner
-from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.world.engine import Engine
 
 
@@ -76,5 +76,5 @@ def test_a_folder_of_another_source_is_refused(tmp_path):
     Scanner(MinjerkSource(), Engine(1, 1), tmp_path)
     other = MinjerkSource()
     other.name = "other"
-    with pytest.raises(FolderMismatch):
+    with pytest.raises(BadInput):
         Scanner(other, Engine(1, 1), tmp_path)

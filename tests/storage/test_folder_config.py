@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import folder_config, provenance
 from dextron_bench.storage.atomic import DamagedFile
-from dextron_bench.storage.folder_config import FolderMismatch
 from tests.helpers import conditions
 
 CONFIG: dict[str, Any] = {"method": "bc", "seed": 0, "settings": {"rate": 0.1, "shape": (2, 3)}, "physics": "abc"}
@@ -71,7 +71,7 @@ def test_another_config_is_refused_and_the_differing_settings_are_named(
     folder_config.write_or_check(tmp_path, CONFIG)
     message = rf"{tmp_path} holds another run: it differs in {names}; remove it, or choose another folder with --runs$"
     for function in (folder_config.check, folder_config.write_or_check):
-        with pytest.raises(FolderMismatch, match=message):
+        with pytest.raises(BadInput, match=message):
             function(tmp_path, CONFIG | change)
 
 
@@ -80,7 +80,7 @@ def test_another_kind_of_folder_has_its_own_file_and_advice(tmp_path: Path):
     folder_config.write_or_check_file(file, {"seed": 0}, "search", "choose another --into")
     folder_config.write_or_check_file(file, {"seed": 0}, "search", "choose another --into")
     assert json.loads(file.read_text()) == {"seed": 0}
-    with pytest.raises(FolderMismatch) as caught:
+    with pytest.raises(BadInput) as caught:
         folder_config.write_or_check_file(file, {"seed": 1}, "search", "choose another --into")
     assert str(caught.value) == f"{tmp_path} holds another search: it differs in seed; choose another --into"
 
@@ -101,7 +101,7 @@ for line in sys.stdin:
     try:
         folder_config.write_or_check(folder / line.strip(), {"seed": seed, "physics": "abc"})
         print("agrees", flush=True)
-    except folder_config.FolderMismatch:
+    except BadInput:
         print("differs", flush=True)
 """
 

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from dextron_bench.errors import Failed
 from dextron_bench.storage import folders
 
 ROOT = Path(__file__).parents[2]
@@ -104,7 +105,7 @@ def test_two_processes_do_not_replace_one_folder(tmp_path: Path):
     with folders.replacing(tmp_path / "board") as part:
         (part / "a.txt").touch()
         with (
-            pytest.raises(folders.FolderBusy, match="another process is changing"),
+            pytest.raises(Failed, match="another process is changing"),
             folders.replacing(part.parent / "b"),
         ):
             pass

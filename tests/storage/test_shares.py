@@ -14,7 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dextron_bench.storage import atomic, block_work, pieces, provenance, shares
+from dextron_bench.errors import BadInput, NotFound
+from dextron_bench.storage import atomic, block_work, provenance, shares
 from dextron_bench.storage.pieces import ListedWork, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.provenance import Machine, Provenance
@@ -56,7 +57,7 @@ def test_every_place_belongs_to_one_share(of: int, place: int):
 
 @pytest.mark.parametrize("text", ["2/2", "-1/2", "half", "1", "1/", "/2", "0/0"])
 def test_shares_that_do_not_exist_are_refused(text: str):
-    with pytest.raises(shares.BadShare, match="share"):
+    with pytest.raises(BadInput, match="share"):
         Share.parse(text)
 
 
@@ -70,7 +71,7 @@ def test_the_number_of_blocks_has_a_margin_of_two_standard_errors():
 def test_a_message_names_the_first_pieces_that_are_missing():
     names = [f"p{k}" for k in range(9)]
     shares.check_complete("the merge", names, set(names))
-    with pytest.raises(shares.MissingPieces, match=r"^the merge lacks 6 of 9 pieces: p0, p2, p4, p5, \.\.\.; run the"):
+    with pytest.raises(NotFound, match=r"^the merge lacks 6 of 9 pieces: p0, p2, p4, p5, \.\.\.; run the"):
         shares.check_complete("the merge", names, {"p1", "p3", "p8"})
 
 
@@ -89,7 +90,7 @@ def test_a_stamp_holds_what_a_piece_depends_on_and_only_its_own_files_are_remove
     assert Work(tmp_path, "c0de", {}).stored() == {}
     stored = work.stored()
     assert set(stored["a"].files) == {inside, outside}
-    with pytest.raises(pieces.ForeignPiece, match="differs in the benchmark's code and seed;"):
+    with pytest.raises(BadInput, match="differs in the benchmark's code and seed;"):
         Work(tmp_path, "other", {"a": config | {"seed": 4}}).stored()
     work.remove(stored.values())
     assert outside.exists()
@@ -137,7 +138,7 @@ def test_shares_play_each_piece_of_several_works_once(tmp_path: Path):
 
     assert shares.play(works, Share(0, 2), bar) == shares.play(works, Share(0, 2), bar) == "3 of 5 pieces"
     assert shown == ["a0", "b0", "b2"]
-    with pytest.raises(shares.MissingPieces, match="the merge lacks 2 of 5 pieces: a1, b1;"):
+    with pytest.raises(NotFound, match="the merge lacks 2 of 5 pieces: a1, b1;"):
         shares.check(works)
     shares.play(works, Share(1, 2), bar)
     shares.check(works)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.submissions import entry
-from dextron_bench.submissions.entry import BadSubmission, Entry
+from dextron_bench.submissions.entry import Entry
 from dextron_bench.submissions.manifest import Agent
 
 
@@ -34,7 +35,7 @@ def test_settings_of_an_installed_method_are_complete():
     ],
 )
 def test_a_bad_name_or_chosen_seeds_are_refused(name: str, seeds: tuple[int, ...], message: str):
-    with pytest.raises(BadSubmission, match=message):
+    with pytest.raises(BadInput, match=message):
         Entry(name, "mine.py:Mine", "synthetic", seeds)
 
 

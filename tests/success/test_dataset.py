@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.storage import tensors
-from dextron_bench.success.dataset import BadDataset, Dataset, EmptyDataset
+from dextron_bench.success.dataset import Dataset
 
 
 def block_file(folder: Path, number: int) -> Path:
@@ -53,23 +54,23 @@ def test_all_episodes_of_a_setting_are_on_one_side(tmp_path: Path):
 
 def test_a_data_set_with_few_settings_is_refused(tmp_path: Path):
     write_block(tmp_path, 0, [1, 1, 1, 1], [0, 1, 0, 1])
-    with pytest.raises(BadDataset, match="have fewer than 5 settings, so none can be held out"):
+    with pytest.raises(BadInput, match="have fewer than 5 settings, so none can be held out"):
         Dataset(tmp_path, test=True)
 
 
 def test_a_folder_without_a_usable_data_set_is_refused(tmp_path: Path):
-    with pytest.raises(EmptyDataset, match="success data"):
+    with pytest.raises(NotFound, match="success data"):
         Dataset(tmp_path)
     write_block(tmp_path, 0, [2], [1])
     file = block_file(tmp_path, 0)
     file.write_bytes(file.read_bytes()[:-40])
-    with pytest.raises(BadDataset, match=r"000000\.safetensors is damaged.*; remove it, and run .*success data"):
+    with pytest.raises(BadInput, match=r"000000\.safetensors is damaged.*; remove it, and run .*success data"):
         Dataset(tmp_path)
     write_block(tmp_path, 0, [2], [1])
-    with pytest.raises(BadDataset, match=r"all episodes .* have the same outcome.*more --rows"):
+    with pytest.raises(BadInput, match=r"all episodes .* have the same outcome.*more --rows"):
         Dataset(tmp_path)
     write_block(tmp_path, 2, [2], [0])
-    with pytest.raises(BadDataset, match="lacks block 000001"):
+    with pytest.raises(BadInput, match="lacks block 000001"):
         Dataset(tmp_path)
 
 
@@ -80,7 +81,7 @@ def test_a_flipped_bit_in_a_block_is_noticed(tmp_path: Path):
     content = bytearray(file.read_bytes())
     content[-9] ^= 1
     file.write_bytes(content)
-    with pytest.raises(BadDataset, match=r"000000\.safetensors is damaged.* differ from the digest .*; remove it"):
+    with pytest.raises(BadInput, match=r"000000\.safetensors is damaged.* differ from the digest .*; remove it"):
         Dataset(tmp_path)
 
 
@@ -89,13 +90,13 @@ def test_blocks_with_missing_arrays_wrong_shapes_or_nan_are_refused(tmp_path: Pa
     file = block_file(tmp_path, 0)
     arrays = tensors.read(file)
     tensors.write(file, {name: arrays[name] for name in ("states", "actions", "starts")}, {})
-    with pytest.raises(BadDataset, match="lacks 'solved'"):
+    with pytest.raises(BadInput, match="lacks 'solved'"):
         Dataset(tmp_path)
     tensors.write(file, arrays | {"starts": arrays["starts"][:-1]}, {})
-    with pytest.raises(BadDataset, match=r"has an array 'starts' of the wrong shape \(2,\)"):
+    with pytest.raises(BadInput, match=r"has an array 'starts' of the wrong shape \(2,\)"):
         Dataset(tmp_path)
     arrays["states"][3, 7] = np.nan
     tensors.write(file, arrays, {})
     assert len(Dataset(tmp_path).take(np.array([0, 1]))[1]) == 2
-    with pytest.raises(BadDataset, match=r"000000\.safetensors holds numbers that are not finite"):
+    with pytest.raises(BadInput, match=r"000000\.safetensors holds numbers that are not finite"):
         Dataset(tmp_path).take(np.array([3]))

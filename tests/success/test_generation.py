@@ -9,22 +9,13 @@ import numpy as np
 import pytest
 
 from baselines.floors import Nothing
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.splits.rows import Rows
-from dextron_bench.storage import folder_config, tensors
+from dextron_bench.storage import tensors
 from dextron_bench.success import generation
-from dextron_bench.success.dataset import BadDataset
-from dextron_bench.success.generation import (
-    POLICY,
-    SOLVED,
-    UNIFORM,
-    BadDatasetConfig,
-    DatasetConfig,
-    Generation,
-    Tally,
-    draw_rows,
-)
+from dextron_bench.success.generation import POLICY, SOLVED, UNIFORM, DatasetConfig, Generation, Tally, draw_rows
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 TRAIN = Rows(cases=tuple(Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS))
@@ -100,9 +91,9 @@ def test_only_an_episode_with_the_whole_return_is_labelled_a_success(tmp_path: P
 
 def test_a_folder_of_another_data_set_is_refused(tmp_path: Path):
     generate_small(tmp_path, 1)
-    with pytest.raises(folder_config.FolderMismatch, match=r"holds another data set.*choose another folder"):
+    with pytest.raises(BadInput, match=r"holds another data set.*choose another folder"):
         generate_small(tmp_path, 1, DatasetConfig("synthetic", seed=1, block=5))
-    with pytest.raises(BadDatasetConfig, match="at least 5 episodes"):
+    with pytest.raises(BadInput, match="at least 5 episodes"):
         DatasetConfig(block=0)
 
 
@@ -110,8 +101,8 @@ def test_a_truncated_block_and_a_number_of_rows_below_1_are_refused(tmp_path: Pa
     generate_small(tmp_path, 100)
     file = work_in(tmp_path).block_file(0)
     file.write_bytes(file.read_bytes()[:-40])
-    with pytest.raises(BadDataset, match=r"000000.*remove it"):
+    with pytest.raises(BadInput, match=r"000000.*remove it"):
         generate_small(tmp_path, 100_000)
-    with pytest.raises(BadDatasetConfig, match="--rows"):
+    with pytest.raises(BadInput, match="--rows"):
         generate_small(tmp_path / "other", 0)
     assert not (tmp_path / "other").exists()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from dextron_bench.success.network import GRID, SIZES, BadModel, MissingModel, SuccessModel, shipped_model
+from dextron_bench.errors import BadInput
+from dextron_bench.success.network import GRID, SIZES, MissingModel, SuccessModel, shipped_model
 from dextron_bench.success.training import initial_network
 
 
@@ -43,13 +44,13 @@ def test_chances_equal_those_of_the_trained_torch_network():
 
 
 def test_arrays_that_are_not_a_success_model_are_refused():
-    with pytest.raises(BadModel, match=r"'layer.1' does not have the shape \(256,\)"):
+    with pytest.raises(BadInput, match=r"'layer.1' does not have the shape \(256,\)"):
         SuccessModel(arrays() | {"layer.1": np.zeros(3)})
-    with pytest.raises(BadModel, match="finite numbers; 'mean' holds others"):
+    with pytest.raises(BadInput, match="finite numbers; 'mean' holds others"):
         SuccessModel(arrays() | {"mean": np.full(48, np.nan)})
-    with pytest.raises(BadModel, match="needs a 'deviation' above 0"):
+    with pytest.raises(BadInput, match="needs a 'deviation' above 0"):
         SuccessModel(arrays() | {"deviation": np.zeros(48)})
-    with pytest.raises(BadModel, match=r"they also hold 'adam.0.step'; take a model\.safetensors"):
+    with pytest.raises(BadInput, match=r"they also hold 'adam.0.step'; take a model\.safetensors"):
         SuccessModel(arrays() | {"adam.0.step": np.zeros(1)})
     with pytest.raises(MissingModel, match="no success model ships for minjerk"):
         shipped_model("minjerk")

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from baselines.floors import Nothing
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.storage import shares
-from dextron_bench.storage.pieces import ForeignPiece, Place
+from dextron_bench.storage.pieces import Place
 from dextron_bench.success import generation
 from tests.helpers.short_reaches import SOURCE
 from tests.helpers.tiny_runs import forbidden
@@ -40,10 +41,10 @@ def test_shares_in_any_order_give_the_same_bytes(tmp_path: Path, monkeypatch: py
 
 
 def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
-    with pytest.raises(shares.MissingPieces, match="lacks the blocks from 000000 on: the blocks before have 0 of 3000"):
+    with pytest.raises(NotFound, match="lacks the blocks from 000000 on: the blocks before have 0 of 3000"):
         work_in(tmp_path).check_complete()
     generate_share(tmp_path, "1/2")
-    with pytest.raises(shares.MissingPieces, match=r"lacks \d of \d+ pieces: block 000000, block 000001"):
+    with pytest.raises(NotFound, match=r"lacks \d of \d+ pieces: block 000000, block 000001"):
         work_in(tmp_path).check_complete()
 
 
@@ -51,7 +52,7 @@ def test_a_piece_of_another_data_set_is_refused(tmp_path: Path):
     generate_share(tmp_path / "a", "0/1")
     other = generation.DatasetConfig("synthetic", seed=1, block=5, policies=("nothing",))
     (tmp_path / "a" / "search.json").unlink()
-    with pytest.raises(ForeignPiece, match=r"000000.json is a piece of other work: it differs in search \(seed\)"):
+    with pytest.raises(BadInput, match=r"000000.json is a piece of other work: it differs in search \(seed\)"):
         work_in(tmp_path / "a", other).check_complete()
 
 

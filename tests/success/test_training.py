@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dextron_bench.storage import folder_config, tensors
-from dextron_bench.success.training import MODEL, STATE, BadTrainingConfig, TrainingConfig, train
+from dextron_bench.errors import BadInput
+from dextron_bench.storage import tensors
+from dextron_bench.success.training import MODEL, STATE, TrainingConfig, train
 from tests.success.test_dataset import block_file, write_block
 from tests.success.test_generation import file_contents
 
@@ -43,7 +44,7 @@ def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path,
     train(tmp_path / "continued", replace(SHORT, epochs=1))
     train(tmp_path / "continued", SHORT)
     assert file_contents(tmp_path / "continued") == file_contents(trained)
-    with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
+    with pytest.raises(BadInput, match="holds another training"):
         train(tmp_path / "continued", replace(SHORT, epochs=1))
 
 
@@ -63,11 +64,11 @@ def test_the_model_keeps_its_learning_curve_and_its_best_epoch(trained: Path):
 
 
 def test_other_settings_impossible_settings_and_a_model_as_state_are_refused(trained: Path):
-    with pytest.raises(folder_config.FolderMismatch, match="holds another training"):
+    with pytest.raises(BadInput, match="holds another training"):
         train(trained, TrainingConfig(epochs=2, updates=4, batch=8))
-    with pytest.raises(BadTrainingConfig, match="above 0"):
+    with pytest.raises(BadInput, match="above 0"):
         TrainingConfig(updates=0)
-    with pytest.raises(BadTrainingConfig, match="0 or more, not -1"):
+    with pytest.raises(BadInput, match="0 or more, not -1"):
         TrainingConfig(seed=-1)
     shutil.copyfile(trained / MODEL, trained / STATE)
     with pytest.raises(tensors.BadTensors, match=r"fit\.safetensors .*not an unfinished training"):

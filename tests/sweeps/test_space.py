@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dextron_bench.errors import BadInput
 from dextron_bench.sweeps import space
-from dextron_bench.sweeps.space import BadSpace, Choices, Range
+from dextron_bench.sweeps.space import Choices, Range
 
 
 def test_a_grid_has_every_combination_in_order():
@@ -44,12 +45,12 @@ def test_a_logarithmic_range_draws_each_power_of_ten_equally_often():
 
 @pytest.mark.parametrize("ends", [(1, 1), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))])
 def test_a_range_needs_two_finite_ends(ends: tuple[float, float]):
-    with pytest.raises(BadSpace, match="finite ends, the smaller one first"):
+    with pytest.raises(BadInput, match="finite ends, the smaller one first"):
         Range(*ends)
 
 
 def test_a_logarithm_needs_a_positive_range():
-    with pytest.raises(BadSpace, match="must begin above 0"):
+    with pytest.raises(BadInput, match="must begin above 0"):
         Range(0.0, 1.0, log=True)
 
 
@@ -57,5 +58,5 @@ def test_values_of_a_file_get_their_types_back():
     parts = {"layers": Choices(((64, 64), (32,))), "rate": Range(0.1, 0.2)}
     stored = json.loads(json.dumps({"layers": (32,), "rate": 0.15}))
     assert space.restored(parts, stored) == {"layers": (32,), "rate": 0.15}
-    with pytest.raises(BadSpace, match="none of the values"):
+    with pytest.raises(BadInput, match="none of the values"):
         space.restored(parts, stored | {"layers": [1]})

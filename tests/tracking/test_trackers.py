@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from rerun.chunk import RrdReader
 
+from dextron_bench.errors import MissingPackage
 from dextron_bench.tracking import films, packages, trackers
 from dextron_bench.tracking.follower import Counts, Follower
 from tests.helpers import tracked_training
@@ -118,5 +119,5 @@ def test_rerun_reads_curves_and_episodes(tmp_path: Path):
 def test_a_tracker_without_its_package_is_named(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(packages.importlib.util, "find_spec", lambda name: None)
     packages.require(["rerun"])
-    with pytest.raises(packages.MissingTracker, match=r"needs the package of this name: `pip install wandb`"):
+    with pytest.raises(MissingPackage, match=r"needs the package of this name: `pip install wandb`"):
         packages.require(["rerun", "wandb"])

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dextron_bench.tracking.training_files import NoTraining, TrainingFiles, training_folders
+from dextron_bench.errors import BadInput
+from dextron_bench.tracking.training_files import TrainingFiles, training_folders
 from tests.helpers.tiny_training import SEEDS
 from tests.helpers.tracked_training import FOLDER, trained
 
@@ -76,7 +77,7 @@ def test_a_training_is_known_by_any_folder_around_it(tmp_path: Path, place: str)
         (tmp_path / f"runs/toy-0.1/synthetic/{name}").mkdir(parents=True)
     (tmp_path / "runs/toy-0.1/synthetic/seed3").mkdir()
     if not place:
-        with pytest.raises(NoTraining, match="holds no training; give a folder in which"):
+        with pytest.raises(BadInput, match="holds no training; give a folder in which"):
             training_folders(tmp_path / "none")
         return
     folders = training_folders(tmp_path / place)

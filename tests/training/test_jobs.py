@@ -10,10 +10,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods.learners import Trainer, TrainingSetup
 from dextron_bench.splits import strata
 from dextron_bench.storage import tensors
-from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.training import jobs
 from dextron_bench.training.checkpoints import Checkpoints
 from dextron_bench.training.jobs import NoDevice, TrainingJob, UnfinishedTraining
@@ -65,7 +65,7 @@ def test_the_best_weights_and_the_curve_are_in_the_folder_of_the_run(job: Traini
 def test_a_run_folder_with_other_settings_is_refused_before_training(job: TrainingJob):
     job.run([0])
     other = TrainingJob(Toy(preset="smoke"), "synthetic", job.runs, threads=1)
-    with pytest.raises(FolderMismatch, match=r"seed0 holds another run: it differs in settings \(preset\)"):
+    with pytest.raises(BadInput, match=r"seed0 holds another run: it differs in settings \(preset\)"):
         other.run([1, 0])
     assert not other.run_folder(1).path.exists()
 

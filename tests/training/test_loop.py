@@ -7,14 +7,13 @@ from typing import Any
 
 import pytest
 
+from dextron_bench.errors import BadInput, Failed
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.storage import atomic, tensors
 from dextron_bench.storage.atomic import DamagedFile, IncompleteFolder, OtherForm
-from dextron_bench.storage.folder_config import FolderMismatch
 from dextron_bench.training import learning_curve, loop, metric_rows
 from dextron_bench.training.checkpoints import Busy, Checkpoints
-from dextron_bench.training.loop import Diverged
 from tests.helpers import tiny_training
 from tests.helpers.tiny_training import QUICK, SEEDS, train
 from tests.helpers.toy_learner import Toy, ToyTrainer
@@ -155,13 +154,13 @@ def test_a_training_depends_on_journal_and_streams(tmp_path: Path, monkeypatch: 
 
 def test_a_divergence_names_the_last_good_checkpoint(tmp_path: Path):
     for _ in range(2):
-        with pytest.raises(Diverged) as caught:
+        with pytest.raises(Failed) as caught:
             train(tmp_path / "a", Toy(preset="quick", spoils=5))
         assert str(caught.value) == (
             "training of 'toy-0.1' diverged: 'loss' of seed 3 is nan in epoch 5; the last good checkpoint is at "
             f"epoch 4 in {tmp_path / 'a'}"
         )
-    with pytest.raises(Diverged, match="in epoch 1; there is no checkpoint yet"):
+    with pytest.raises(Failed, match="in epoch 1; there is no checkpoint yet"):
         train(tmp_path / "b", Toy(preset="quick", spoils=1))
 
 
@@ -285,9 +284,9 @@ def test_a_checkpoint_of_an_earlier_version_without_a_list_continues(tmp_path: P
 
 def test_other_settings_or_another_device_do_not_continue(tmp_path: Path):
     folder = half_done(tmp_path / "a")
-    with pytest.raises(FolderMismatch, match="holds another run: it differs in settings"):
+    with pytest.raises(BadInput, match="holds another run: it differs in settings"):
         train(folder, Toy(preset="paper"))
-    with pytest.raises(FolderMismatch, match="was begun on cpu: continue with --device cpu, or remove it"):
+    with pytest.raises(BadInput, match="was begun on cpu: continue with --device cpu, or remove it"):
         train(folder, Toy(preset="quick", breaks=5), device="cuda")
 
 

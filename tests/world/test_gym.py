@@ -14,9 +14,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import dextron_bench  # noqa: F401  # Registers the environments.
-from dextron_bench.reaches.setting import SettingError, plain
+from dextron_bench.errors import BadInput
+from dextron_bench.reaches.setting import plain
 from dextron_bench.world import task
-from dextron_bench.world.environment import ActionError
 from dextron_bench.world.gym import GraspEnv, GraspVectorEnv
 from tests.helpers.short_reaches import SETTINGS, SOURCE, TORN, TORN_POSE, TornSource, actions, played
 
@@ -97,7 +97,7 @@ def test_a_step_outside_an_episode_raises_reset_needed():
 def test_an_invalid_action_is_refused_and_changes_nothing(action: object):
     env = GraspEnv(SOURCE, [SETTINGS[0]])
     env.reset()
-    with pytest.raises(ActionError, match=r"actions must"):
+    with pytest.raises(BadInput, match=r"actions must"):
         env.step(action)  # pyright: ignore[reportArgumentType]
     state = env.step(actions(0)[0])[0]
     assert state.tobytes() == played(0).states[1].tobytes()
@@ -105,11 +105,11 @@ def test_an_invalid_action_is_refused_and_changes_nothing(action: object):
 
 @pytest.mark.parametrize("value", [0, "a", {}, ("a", 0.0, 0.0, 0.0), False])
 def test_a_setting_that_is_none_is_refused(value: object):
-    with pytest.raises(SettingError, match="must be a dextron_bench Setting; got"):
+    with pytest.raises(BadInput, match="must be a dextron_bench Setting; got"):
         GraspEnv(SOURCE).reset(options={"setting": value})
-    with pytest.raises((SettingError, ValueError)):
+    with pytest.raises((BadInput, ValueError)):
         GraspVectorEnv(2, SOURCE).reset(options={"setting": value})
-    with pytest.raises(SettingError, match="must be a dextron_bench Setting; got"):
+    with pytest.raises(BadInput, match="must be a dextron_bench Setting; got"):
         GraspEnv(SOURCE, [SETTINGS[0], value])  # pyright: ignore[reportArgumentType]
 
 

@@ -14,8 +14,8 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 import dextron_bench  # noqa: F401  # Registers the environments.
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.setting import Setting
-from dextron_bench.world.environment import ActionError
 from dextron_bench.world.gym import GraspEnv, GraspVectorEnv
 from tests.helpers.short_reaches import SETTINGS, SOURCE, TORN, TORN_POSE, TornSource, actions, played
 
@@ -66,9 +66,9 @@ def settings(infos: dict[str, Any]) -> list[Setting]:
 def test_one_invalid_action_among_many_is_refused():
     env = GraspVectorEnv(3, SOURCE)
     env.reset(seed=0)
-    with pytest.raises(ActionError, match=r"lie in \[-1, 1\].*got 1.5"):
+    with pytest.raises(BadInput, match=r"lie in \[-1, 1\].*got 1.5"):
         env.step(np.array([[0.0], [1.5], [0.0]]))
-    with pytest.raises(ActionError, match=r"shape \(3, 1\); got \(3,\)"):
+    with pytest.raises(BadInput, match=r"shape \(3, 1\); got \(3,\)"):
         env.step(np.zeros(3))
 
 

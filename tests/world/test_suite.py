@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from dm_control.rl import control
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.sources import UnknownSource
 from dextron_bench.world import model, suite
 from dextron_bench.world.engine import STATE_BOUND
-from dextron_bench.world.environment import ActionError
 from tests.helpers.short_reaches import SETTINGS, SOURCE, TORN, TORN_POSE, TornSource, actions, played
 
 
@@ -134,7 +134,7 @@ def test_settings_are_played_in_turn_again_and_again():
 @pytest.mark.parametrize("action", [[np.nan], [1.0 + 1.1e-6], [-2.0], [0.0, 0.0], 0.5, ["close"]])
 def test_a_bad_action_is_refused(env: control.Environment, action: object):
     env.reset()
-    with pytest.raises(ActionError, match=r"actions must"):
+    with pytest.raises(BadInput, match=r"actions must"):
         env.step(action)
 
 

@@ -11,6 +11,7 @@ import pandas as pd
 
 from dextron_bench.catalogue import expressions
 from dextron_bench.catalogue.episodes import COLUMNS
+from dextron_bench.errors import BadInput
 
 SHOWN = 24  # Cards on a page.
 ORDERS = {  # Name of each order, with its column and whether the lowest values come first.
@@ -24,7 +25,7 @@ ORDERS = {  # Name of each order, with its column and whether the lowest values 
 DEFAULT = next(iter(ORDERS))
 
 
-class UnknownOrder(ValueError):
+class UnknownOrder(BadInput):
     """No order of episodes has this name."""
 
     def __init__(self, name: str) -> None:

@@ -17,6 +17,7 @@ from dextron_bench.catalogue import rerecording, selection
 from dextron_bench.catalogue.browse import page
 from dextron_bench.catalogue.browse.pictures import Pictures
 from dextron_bench.catalogue.browse.search import Search
+from dextron_bench.errors import BadInput
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.web.local_server import (
     Request,
@@ -33,10 +34,6 @@ PICTURE, OPEN = re.compile(rf"/picture/{KEY}\.png"), re.compile(rf"/open/{KEY}")
 RECORDING = re.compile(rf"/recordings/{KEY}\.rrd")
 
 Show = Callable[[Path], None]  # Shows a recording, and does not wait until the user has seen it.
-
-
-class DamagedRecording(ValueError):
-    """A recording that is not shown."""
 
 
 class BrowseSite:
@@ -104,10 +101,10 @@ class BrowseSite:
         return RunFolder(Path(episode["run"])).recording(episode["split"], episode["row"])
 
     def _make(self, key: str) -> None:
-        """Makes the recording of an episode if there is none; raises the errors of `rerecord`, and DamagedRecording."""
+        """Makes the recording of an episode if there is none; raises the errors of `rerecord`, and BadInput."""
         from dextron_bench import recording
 
         files = rerecording.rerecord(self._episodes.loc[[key]])
         for summary in recording.summarise(files, whole=True, hashes=selection.hashes(files)):
             if summary.damage:
-                raise DamagedRecording(f"{summary.file}: {summary.damage}")
+                raise BadInput(f"{summary.file}: {summary.damage}")

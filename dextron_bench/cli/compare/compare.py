@@ -12,6 +12,7 @@ from dextron_bench.cli.compare.cells import DIFFERENCE, HOLM, difference_text
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import print_json, print_table
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
@@ -21,10 +22,6 @@ if TYPE_CHECKING:
     from dextron_bench.scores.paired import Difference
 
 SHOWN = 5  # How many settings are listed that more seeds of B solve, and that fewer do.
-
-
-class OnlyForTwo(ValueError):
-    """A flag that needs exactly two methods."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ class Compare:
         from dextron_bench.scores import comparison
 
         if self.others and (self.into is not None or self.fail_if_worse):
-            raise OnlyForTwo("--into and --fail-if-worse need two methods, not more")
+            raise BadInput("--into and --fail-if-worse need two methods, not more")
         names = (self.a, self.b, *self.others)
         results = [result_files.find(name, self.runs, self.split) for name in names]
         methods = comparison.align_all(names, results, self.split, self.reaches)

@@ -11,13 +11,10 @@ import tyro
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.sources import SourceName
 
 TOO_MANY = "more seeds are needed"
-
-
-class BadPlan(ValueError):
-    """A difference or a number of seeds that no plan can have."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +52,7 @@ class Plan:
         from dextron_bench.world import task
 
         if self.difference <= 0.0 or min(self.seeds) < 2:
-            raise BadPlan("--difference must be above 0, and --seeds at least 2: one seed does not show their spread")
+            raise BadInput("--difference must be above 0, and --seeds at least 2: one seed does not show their spread")
         results = [result_files.find(name, self.runs, self.split) for name in (self.a, self.b)]
         a, b = comparison.align((self.a, self.b), (results[0], results[1]), self.split, self.reaches)
         one, other = (100.0 * (x.scores == task.SUCCESS) if self.measure == "success" else x.scores for x in (a, b))

@@ -9,22 +9,11 @@ from typing import TYPE_CHECKING, Any
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_table
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.reaches.sources import SourceName
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-class NeedsSource(ValueError):
-    """Splits are built of one source of reaches, and none was given."""
-
-
-class NeedsDatabase(ValueError):
-    """The splits of this source are built from an expert database, and none was given."""
-
-
-class NeedsSplits(FileNotFoundError):
-    """The folder has no splits to which other bottles could be added."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +44,7 @@ class Splits:
         if self.into is None:
             return self._list()
         if self.reaches is None:
-            raise NeedsSource("--into builds the splits of one source: give --reaches")
+            raise BadInput("--into builds the splits of one source: give --reaches")
         entry = self._build(self.reaches, self.into)
         rows = [(name, split["rows"], split["digest"][:8]) for name, split in entry.items()]
         print_table(f"splits of {self.reaches} reaches in {self.into}", ["split", "rows", "version"], rows)
@@ -85,7 +74,7 @@ class Splits:
         if reaches == "minjerk":
             return building_minjerk.build(into, engine)
         if self.database is None:
-            raise NeedsDatabase(f"splits of {reaches} reaches need --database, which `dextron-bench data mc` writes")
+            raise BadInput(f"splits of {reaches} reaches need --database, which `dextron-bench data mc` writes")
         rows, summary = experts_database.load(self.database), experts_database.summary(self.database)
         entry, distance = building.build(Scanner(source, engine, scans), rows, summary, into)
         print(f"best distance of the rule of thumb on val: {distance:g} m")
@@ -93,10 +82,10 @@ class Splits:
 
 
 def _table(file: Path) -> pd.DataFrame:
-    """The table of splits in a file; raises NeedsSplits."""
+    """The table of splits in a file; raises NotFound."""
     import pandas as pd
 
     try:
         return pd.read_parquet(file)
     except (OSError, ValueError) as error:
-        raise NeedsSplits(f"--bottles needs {file}: build the splits first, without --bottles ({error})") from error
+        raise NotFound(f"--bottles needs {file}: build the splits first, without --bottles ({error})") from error

@@ -10,6 +10,7 @@ import tyro
 
 from dextron_bench.cli.support import verdicts
 from dextron_bench.cli.support.verification_flags import BoardFlags
+from dextron_bench.errors import BadInput, NotFound
 
 
 @dataclass(frozen=True)
@@ -29,18 +30,14 @@ class Verify(BoardFlags):
 
     def __call__(self) -> int:
         from dextron_bench.cli.leaderboard import board_verification
-        from dextron_bench.leaderboard import verify_board
-        from dextron_bench.storage.shares import BadShare
 
         self.pieces.check()
         if self.all and self.bundle is not None:
-            raise verify_board.NothingToVerify(
-                f"--all verifies the leaderboard's own rows: leave out {self.bundle}, or leave out --all"
-            )
+            raise NotFound(f"--all verifies the leaderboard's own rows: leave out {self.bundle}, or leave out --all")
         if not self.all and self.bundle is None:
-            raise verify_board.NothingToVerify("give a submission, or --all for the leaderboard's own rows")
+            raise NotFound("give a submission, or --all for the leaderboard's own rows")
         if self.bundle is not None and self.pieces.given:
-            raise BadShare("--share, --merge and --cluster need --all: the verification of a submission is one piece")
+            raise BadInput("--share, --merge and --cluster need --all: the verification of a submission is one piece")
         if self.bundle is None:
             return board_verification.verify_board(self)
         with verdicts.unpacked(self.bundle) as opened:

@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING
 
 from dextron_bench.cli.support import flags, run_names
 from dextron_bench.cli.support.exit_codes import DONE
+from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
     pass
 
 ARCHIVE = "archive"  # Beside the folder of all runs, after its name.
-
-
-class AlreadyArchived(ValueError):
-    """An archive that holds a run of the same name."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class Archive:
         places = {folder: archive / folder.relative_to(self.runs) for folder in run_names.folders(self.runs, self.run)}
         for folder, place in places.items():
             if os.path.lexists(place):
-                raise AlreadyArchived(f"{place} exists; remove it, or give it another name")
+                raise BadInput(f"{place} exists; remove it, or give it another name")
             place.parent.mkdir(parents=True, exist_ok=True)
             folders.move(folder, place)
             run_names.remove_if_empty(folder, self.runs)

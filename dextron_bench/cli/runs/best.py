@@ -11,6 +11,7 @@ from dextron_bench.catalogue.run_search import RunFilter
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json
+from dextron_bench.errors import BadInput
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Best:
         entrants = [entry for entry in run_catalogue.entries(self.runs) if entry.label not in CEILINGS]
         entries = run_search.ordered(run_search.matching(entrants, self.filter, self.split), "return", self.split)
         if not entries or entries[0].score(self.split) != entries[0].score(self.split):
-            raise run_search.BadSearch(f"none of the {len(entries)} runs has a score on {self.split!r}")
+            raise BadInput(f"none of the {len(entries)} runs has a score on {self.split!r}")
         best = entries[0]
         row = {"run": best.name, "return": best.score(self.split), "success": best.score(self.split, "success")}
         row |= {"seeds": len(best.seeds), "settings": dict(best.settings)}

@@ -11,13 +11,10 @@ from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table
 from dextron_bench.cli.support.run_cells import INTERVALS, code_of, interval_text, plain
+from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
     from dextron_bench.catalogue.run_catalogue import Entry
-
-
-class NoCurves(ValueError):
-    """A picture of learning curves is asked for, of runs that have none."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,7 @@ class Compare:
         known = run_catalogue.entries(self.runs)
         entries = [run_catalogue.find(known, name) for name in self.run]
         if self.into is not None and not any(entry.curves for entry in entries):
-            raise NoCurves("none of these runs has a learning curve to draw: leave out --into")
+            raise BadInput("none of these runs has a learning curve to draw: leave out --into")
         names = run_search.differing_settings(entries)
         settings = {entry.name: {name: _setting(entry, name) for name in names} for entry in entries}
         scores = _scores(entries)

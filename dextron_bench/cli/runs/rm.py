@@ -8,10 +8,7 @@ from dataclasses import dataclass
 from dextron_bench.cli.support import flags, run_names
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_warning
-
-
-class NotConfirmed(ValueError):
-    """Runs that would be removed without a confirmation."""
+from dextron_bench.errors import BadInput
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ class Remove:
         if not self.yes:
             names = ", ".join(self.run)
             if not sys.stdin.isatty():
-                raise NotConfirmed(f"{names} would be removed for good; confirm with --yes")
+                raise BadInput(f"{names} would be removed for good; confirm with --yes")
             if input(f"remove {names} for good? [y/N] ").strip().lower() not in ("y", "yes"):
                 return DONE
         for folder in places:

@@ -27,7 +27,7 @@ class BaselineFlags:
     def baselines(self) -> dict[str, list[Row]]:
         """The selected rows of baselines, by source; submissions are played by their authors.
 
-        Raises NothingToVerify, DamagedFile.
+        Raises NotFound, DamagedFile.
         """
         from dextron_bench.leaderboard import verify_board
 

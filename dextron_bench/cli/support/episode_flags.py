@@ -37,7 +37,7 @@ class EpisodeFlags:
     """Select only episodes that match an expression, as in `browse`: "cause == 'too late' and return < 5"."""
 
     def episode_filter(self) -> EpisodeFilter:
-        """The filter of these flags; raises BadFilter."""
+        """The filter of these flags; raises BadInput."""
         from dextron_bench.catalogue.selection import EpisodeFilter
 
         return EpisodeFilter(**{name: getattr(self, name) for name in EpisodeFilter.__slots__})

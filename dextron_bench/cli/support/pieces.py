@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from dextron_bench.cli.support.output import print_warning, progress_bar
+from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
     from dextron_bench.cluster.ray_cluster import RayCluster
@@ -38,24 +39,24 @@ class PieceFlags:
         return bool(self.share or self.merge or self.cluster)
 
     def check(self) -> None:
-        """Raises BadShare and BadCluster if the flags name no share or no cluster, or contradict each other."""
-        from dextron_bench.storage.shares import BadShare, Share
+        """Raises BadInput if the flags name no share or no cluster, or contradict each other."""
+        from dextron_bench.storage.shares import Share
 
         check_cluster(self.cluster)
         if self.cluster and (self.share or self.merge):
-            raise BadShare(
+            raise BadInput(
                 "--cluster does all pieces and puts them together: leave out --share and --merge, or leave out "
                 "--cluster"
             )
         if self.share and self.merge:
-            raise BadShare("--share does a part of the pieces and --merge puts all of them together: give one of both")
+            raise BadInput("--share does a part of the pieces and --merge puts all of them together: give one of both")
         if self.share:
             Share.parse(self.share)
 
     def play(self, works: Callable[[], Sequence[ListedWork]], runs: Path, threads: int, quiet: bool) -> bool:
         """Plays what the flags ask for of works below a folder of runs; True if this was a share, which ends there.
 
-        Raises MissingPieces if pieces are missing for a merge, and the errors of the works.
+        Raises NotFound if pieces are missing for a merge, and the errors of the works.
         """
         from dextron_bench.storage import shares
 
@@ -91,7 +92,7 @@ Pieces = Annotated[PieceFlags, tyro.conf.arg(name="")]  # The type of a field wh
 
 
 def check_cluster(cluster: str) -> None:
-    """Raises BadCluster if a flag names no cluster, or if Ray is not installed; a command without the flag is fine."""
+    """Raises BadInput if a flag names no cluster, or if Ray is not installed; a command without the flag is fine."""
     if cluster:
         from dextron_bench.cluster import ray_cluster
 

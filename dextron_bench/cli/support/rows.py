@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dextron_bench.errors import BadInput
+
 if TYPE_CHECKING:
     from dextron_bench.splits.loading import Split
     from dextron_bench.splits.rows import Rows
 
 
-class NoRows(ValueError):
-    """A number of rows below 1."""
-
-
 def first(split: Split, rows: int) -> Rows:
-    """The first rows of a split; raises NoRows for fewer than one."""
+    """The first rows of a split; raises BadInput for fewer than one."""
     if rows < 1:
-        raise NoRows(f"--rows must be 1 or more, not {rows}")
+        raise BadInput(f"--rows must be 1 or more, not {rows}")
     return split.first(rows)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from dextron_bench.errors import BadInput
+
 if TYPE_CHECKING:
     from dextron_bench.catalogue.run_catalogue import Entry
 
@@ -14,7 +16,7 @@ SETTINGS = "settings."  # Begins the name of a column with a setting.
 
 
 def cell(entry: Entry, name: str, split: str) -> Any:
-    """The value of a column, as JSON has it; raises BadSearch."""
+    """The value of a column, as JSON has it; raises BadInput."""
     values = {
         **{"run": entry.name, "state": entry.state, "seeds": len(entry.seeds), "note": entry.note},
         **{"val": _none_for_nan(entry.score("val")), "return": _none_for_nan(entry.score(split))},
@@ -24,9 +26,7 @@ def cell(entry: Entry, name: str, split: str) -> Any:
     if name.startswith(SETTINGS):
         return entry.settings.get(name.removeprefix(SETTINGS))
     if name not in values:
-        from dextron_bench.catalogue import run_search
-
-        raise run_search.BadSearch(f"no column {name!r}; choose from {', '.join(values)} and {SETTINGS}NAME")
+        raise BadInput(f"no column {name!r}; choose from {', '.join(values)} and {SETTINGS}NAME")
     return values[name]
 
 

@@ -7,12 +7,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dextron_bench.errors import BadInput
+
 if TYPE_CHECKING:
     from dextron_bench.catalogue.run_catalogue import Entry
-
-
-class LinkedRuns(ValueError):
-    """Some of the runs to which one link leads."""
 
 
 def remove_if_empty(folder: Path, runs: Path) -> None:
@@ -25,7 +23,7 @@ def remove_if_empty(folder: Path, runs: Path) -> None:
 def folders(runs: Path, names: Iterable[str]) -> list[Path]:
     """The folders of runs, each once; if the folder of a method is a link, that link stands for all its runs.
 
-    Raises LinkedRuns if some of these runs are not named, and UnknownRun.
+    Raises BadInput if some of these runs are not named, and NotFound.
     """
     from dextron_bench.catalogue import run_catalogue
 
@@ -34,12 +32,12 @@ def folders(runs: Path, names: Iterable[str]) -> list[Path]:
     places = {folder: folder.parent if folder.parent.is_symlink() else folder for folder in chosen}
     for folder in places.values():
         if others := [entry.name for entry in known if entry.folder.parent == folder and entry.folder not in chosen]:
-            raise LinkedRuns(f"{folder} is a link, and it has {', '.join(others)} too; name all of its runs, or none")
+            raise BadInput(f"{folder} is a link, and it has {', '.join(others)} too; name all of its runs, or none")
     return sorted(set(places.values()))
 
 
 def find(runs: Path, name: str) -> Entry:
-    """A run in the folder of all runs; raises UnknownRun."""
+    """A run in the folder of all runs; raises NotFound."""
     from dextron_bench.catalogue import run_catalogue
 
     return run_catalogue.find(run_catalogue.entries(runs), name)

@@ -17,6 +17,8 @@ from typing import Any, TypeVar
 
 import tyro
 
+from dextron_bench.errors import BadInput
+
 FIELD = "method_settings"  # Of commands, for the settings of a method. Its name is no flag, and methods have others.
 T = TypeVar("T")
 
@@ -24,23 +26,15 @@ LARGEST_PORT = 65535
 LARGEST = 2**31 - 1  # Threads, rows and seeds are such numbers in the libraries, too.
 
 
-class BadNumber(ValueError):
-    """A number that a flag cannot have."""
-
-
-class BadName(ValueError):
-    """An argument whose bytes are no text."""
-
-
 def check_numbers(command: Any) -> None:
-    """Raises BadNumber if a flag that takes numbers has one that is negative or too large: all of them are amounts."""
+    """Raises BadInput if a flag that takes numbers has one that is negative or too large: all of them are amounts."""
     for field in dataclasses.fields(command):
         value = getattr(command, field.name)
         largest = LARGEST_PORT if field.name == "port" else LARGEST
         for number in value if isinstance(value, tuple) else (value,):
             if isinstance(number, int | float) and not 0 <= number <= largest:
                 limit = f"at most {largest}" if number > largest else "0 or more"
-                raise BadNumber(f"--{field.name.replace('_', '-')} is {number}; it must be {limit}")
+                raise BadInput(f"--{field.name.replace('_', '-')} is {number}; it must be {limit}")
 
 
 def fault(command: type, words: Sequence[str]) -> str:

@@ -13,6 +13,7 @@ from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import print_json, print_table, progress_bar
 from dextron_bench.cli.sweep.output import in_words
+from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
     from dextron_bench.sweeps.sweep import Sweep as Question
@@ -69,12 +70,12 @@ class Sweep:
 
     def __call__(self) -> int:
         from dextron_bench.sweeps import execution, space
-        from dextron_bench.sweeps.sweep import BadSweep, SweepFile, default_name
+        from dextron_bench.sweeps.sweep import SweepFile, default_name
 
         if self.show and not (self.grid or self.search):
             return self._show_all() if not self.name else self._print(SweepFile.of(self.runs, self.name))
         if not self.method:
-            raise BadSweep("give --method, or --show to see the sweeps in the folder of runs")
+            raise BadInput("give --method, or --show to see the sweeps in the folder of runs")
         pieces.check_cluster(self.cluster)
         question = self._question()
         file = SweepFile.of(self.runs, self.name or default_name(question))
@@ -98,10 +99,9 @@ class Sweep:
         """Trains and plays on a cluster what the trials lack; a trial that fails there is left for this process."""
         from dextron_bench.cluster import trials
         from dextron_bench.sweeps import execution
-        from dextron_bench.sweeps.sweep import BadSweep
 
         if not question.trials_are_independent:
-            raise BadSweep(
+            raise BadInput(
                 "with --cluster trials run side by side, and with --sampler tpe or gp and with --prune they depend on "
                 "earlier ones: leave those out, or leave out --cluster"
             )
@@ -115,13 +115,13 @@ class Sweep:
     def _question(self) -> Question:
         """What the flags ask."""
         from dextron_bench.cli.sweep import space as sweep_space
-        from dextron_bench.sweeps.sweep import BadSweep, Sweep
+        from dextron_bench.sweeps.sweep import Sweep
 
         space = sweep_space.parse(self.method_settings, self.grid, self.search)
         if self.grid and self.sampler != "random":
-            raise BadSweep("--grid tries every combination; --sampler goes with --search")
+            raise BadInput("--grid tries every combination; --sampler goes with --search")
         if self.trials < 1 or self.sampler_seed < 0:
-            raise BadSweep("--trials is 1 or more, and --sampler-seed 0 or more")
+            raise BadInput("--trials is 1 or more, and --sampler-seed 0 or more")
         fixed = {name: value for name, value in settings_dict(self.method_settings).items() if name not in space}
         seeds = tuple(dict.fromkeys(self.seed))
         sampler = "grid" if self.grid else self.sampler
@@ -147,16 +147,15 @@ class Sweep:
         return EPISODES_FAILED if any(trial.failed or trial.state == FAILED for trial in trials) else DONE
 
     def _check_picture(self, space: Mapping[str, Any]) -> None:
-        """Raises UnknownFormat or BadSweep if the scores over this space cannot be drawn into the file."""
+        """Raises UnknownFormat or BadInput if the scores over this space cannot be drawn into the file."""
         if self.into is None:
             return
         from dextron_bench.scores.figures import pictures
-        from dextron_bench.sweeps.sweep import BadSweep
 
         pictures.check_format(self.into)
         values = [value for part in space.values() for value in part.get("values", ())]
         if len(space) != 1 or not all(type(value) in (int, float) for value in values):
-            raise BadSweep("--into draws the scores against one setting with numbers; vary one, as in near=0.04,0.06")
+            raise BadInput("--into draws the scores against one setting with numbers; vary one, as in near=0.04,0.06")
 
     def _show_all(self) -> int:
         """Prints a row for each sweep."""

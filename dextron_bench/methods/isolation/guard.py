@@ -14,10 +14,11 @@ from importlib.abc import MetaPathFinder
 from pathlib import Path
 from typing import Any
 
+from dextron_bench.errors import DextronError
 from dextron_bench.methods.isolation import sandbox
 
 PUBLIC = {  # Modules of the benchmark that agents may import, and the modules that these import (docs/agents.md).
-    *("dextron_bench", "dextron_bench.experts", "dextron_bench.experts.policies"),
+    *("dextron_bench", "dextron_bench.errors", "dextron_bench.experts", "dextron_bench.experts.policies"),
     *("dextron_bench.methods", *(f"dextron_bench.methods.{name}" for name in ("agents", "exact", "learners"))),
     *("dextron_bench.reaches", *(f"dextron_bench.reaches.{name}" for name in ("reach", "rotation", "timing"))),
     *("dextron_bench.storage", *(f"dextron_bench.storage.{name}" for name in ("atomic", "hashing", "tensors"))),
@@ -42,7 +43,7 @@ WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 DEVICES = ("/dev/null", "/dev/urandom", "/dev/random", "/proc/cpuinfo", "/proc/meminfo", "/proc/self", "/sys/devices")
 
 
-class NotForAgents(PermissionError):
+class NotForAgents(DextronError, PermissionError):
     """An agent tried something that it may not do."""
 
     def __init__(self, action: str) -> None:

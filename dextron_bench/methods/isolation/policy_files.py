@@ -7,11 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods.specs import POLICIES
-
-
-class BadPolicy(ValueError):
-    """A file that holds no TorchScript or ONNX policy."""
 
 
 class FilePolicy:
@@ -29,10 +26,10 @@ class FilePolicy:
 
 
 def load(file: Path) -> FilePolicy:
-    """The policy (N, 48) to (N, 1) of a TorchScript (.pt) or ONNX (.onnx) file; raises BadPolicy."""
+    """The policy (N, 48) to (N, 1) of a TorchScript (.pt) or ONNX (.onnx) file; raises BadInput."""
     loaders = {".pt": _load_torchscript, ".onnx": _load_onnx}
     if file.suffix not in loaders:
-        raise BadPolicy(f"{file} is not a policy: a policy's file ends in {' or '.join(POLICIES)}")
+        raise BadInput(f"{file} is not a policy: a policy's file ends in {' or '.join(POLICIES)}")
     return FilePolicy(loaders[file.suffix](file))
 
 
@@ -44,7 +41,7 @@ def _load_torchscript(file: Path) -> Callable[[np.ndarray], np.ndarray]:
         module = torch.jit.load(str(file), map_location="cpu").eval()
     except (RuntimeError, ValueError) as error:
         reason = str(error).splitlines()[0]
-        raise BadPolicy(f"{file} is not a TorchScript file ({reason}); torch.jit.save writes one") from error
+        raise BadInput(f"{file} is not a TorchScript file ({reason}); torch.jit.save writes one") from error
 
     def act(states: np.ndarray) -> np.ndarray:
         with torch.inference_mode():
@@ -57,12 +54,12 @@ def _load_onnx(file: Path) -> Callable[[np.ndarray], np.ndarray]:
     try:
         import onnxruntime  # pyright: ignore[reportMissingImports]
     except ModuleNotFoundError as error:
-        raise BadPolicy(f"{file} needs ONNX Runtime: `pip install onnxruntime`") from error
+        raise BadInput(f"{file} needs ONNX Runtime: `pip install onnxruntime`") from error
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     try:
         session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime has exception types of its own.
-        raise BadPolicy(f"{file} is not an ONNX file that can be run ({str(error).splitlines()[0]})") from error
+        raise BadInput(f"{file} is not an ONNX file that can be run ({str(error).splitlines()[0]})") from error
     name = session.get_inputs()[0].name
     return lambda states: np.asarray(session.run(None, {name: states})[0])

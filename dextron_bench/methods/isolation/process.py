@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import IO
 
+from dextron_bench.errors import Failed
 from dextron_bench.methods.isolation import usage
 from dextron_bench.storage.printable import printable
 
@@ -23,7 +24,7 @@ STDERR_TAIL = 2000  # [bytes] at the end of stderr in which the last line is sea
 LAST_LINE = 500  # Characters of that line that a message shows; a table of episodes in a bundle has short texts only.
 
 
-class NoAnswer(RuntimeError):
+class NoAnswer(Failed):
     """The process gave no answer; the message says why."""
 
 

@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
+
 PROTOCOL = 1
 ACTION_SIZE = 40  # [bytes] that one action may take in an answer.
 HEAD_SIZE = 4096  # [bytes] that the rest of an answer may take.
 
 
-class BadAnswer(ValueError):
+class BadAnswer(BadInput):
     """A line that does not follow the protocol."""
 
 

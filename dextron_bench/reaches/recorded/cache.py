@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dextron_bench.errors import NotFound
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import parsing, release
 from dextron_bench.reaches.recorded.release import Manifest
@@ -27,7 +28,7 @@ LAYOUT = "1"  # Version of the layout of the cache file; a file of another versi
 COLUMNS = ("names", "counts", "times", "positions", "quaternions", "reached")
 
 
-class MissingData(LookupError):
+class MissingData(NotFound):
     """The recorded reaches are not on this machine; the message says how to get them."""
 
     def __init__(self, reason: str = "have not been imported") -> None:
@@ -69,7 +70,7 @@ def imported() -> Path | None:
 def import_release(location: Path, manifest: Manifest | None = None, progress: Progress = no_progress) -> list[Reach]:
     """Reads and checks the release at `location`, stores it in the cache, and returns its reaches.
 
-    Raises ReleaseError if a file differs from the published one, OSError if the cache cannot be written, NoHome.
+    Raises BadInput if a file differs from the published one, OSError if the cache cannot be written, NoHome.
     """
     file, manifest = cache_file(), manifest or Manifest.load()
     reaches = release.read(location, manifest, progress)
@@ -80,7 +81,7 @@ def import_release(location: Path, manifest: Manifest | None = None, progress: P
 def load_reaches(manifest: Manifest | None = None) -> list[Reach]:
     """The recorded reaches, sorted by name, from the cache or else from the release that DEXTRON_DATA names.
 
-    Raises MissingData if neither can be read, ReleaseError as `import_release` does.
+    Raises MissingData if neither can be read, BadInput as `import_release` does.
     """
     manifest = manifest or Manifest.load()
     try:

@@ -9,6 +9,7 @@ from http.client import HTTPException
 from pathlib import Path
 from typing import IO
 
+from dextron_bench.errors import Failed
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded.cache import cache_file, import_release
 from dextron_bench.reaches.recorded.release import Manifest
@@ -20,7 +21,7 @@ CHUNK = 1 << 18
 TIMEOUT = 30.0  # [s] longest wait for the next bytes.
 
 
-class FetchError(RuntimeError):
+class FetchError(Failed):
     """The release could not be downloaded; the message says why and what to do instead."""
 
     def __init__(self, url: str, reason: object) -> None:
@@ -34,7 +35,7 @@ def fetch(manifest: Manifest | None = None, progress: Progress = no_progress, ur
     """Downloads the release, imports it as `cache.import_release` does, and returns its reaches.
 
     Calls `progress` with the number of bytes so far, and the total or 0 if the server does not report it. Raises
-    FetchError, ReleaseError, NoHome or OSError.
+    FetchError, BadInput, NoHome or OSError.
     """
     cache_file()  # Without a place for the reaches, nothing is downloaded.
     with tempfile.TemporaryDirectory(prefix="dextron-bench-") as folder:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.reach import MIN_GAP, Reach, clean
 
 TABLE = 0.2  # [m] height above the table of the plane from which recorded heights are measured.
@@ -18,7 +19,7 @@ MIN_SAMPLES = 4  # The least that a cubic spline needs.
 UNIT = 1e-3  # Largest accepted deviation from unit length; in the recordings it is below 1e-7.
 
 
-class RecordingError(ValueError):
+class RecordingError(BadInput):
     """A file is not a valid recording; the message names the file, the line and the reason."""
 
 

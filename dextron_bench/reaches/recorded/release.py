@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import parsing
 from dextron_bench.storage.progress import Progress, no_progress
@@ -27,10 +28,6 @@ MAX_MEMBERS = 100_000  # Most members of an archive; the authors' whole reposito
 MEMBER = re.compile(r"(?:[^/\\]+/)?(?:data/)?(extracts/(?:meta/)?\w+\.json)")
 
 Reader = Callable[[str], bytes]
-
-
-class ReleaseError(ValueError):
-    """A release cannot be imported; the message names the file and the reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +52,7 @@ class Manifest:
 def read(location: Path, manifest: Manifest, progress: Progress = no_progress) -> list[Reach]:
     """All reaches of the release at `location`, sorted by name, after a check of each file against the manifest.
 
-    Calls `progress` with the numbers of reaches read and in all. Raises ReleaseError, and FileNotFoundError if
+    Calls `progress` with the numbers of reaches read and in all. Raises BadInput, and FileNotFoundError if
     `location` does not exist.
     """
     names, reaches = manifest.reaches, []
@@ -66,7 +63,7 @@ def read(location: Path, manifest: Manifest, progress: Progress = no_progress) -
                 contents = {file: reader(file) for file in files}
                 reach = parsing.parse(name, *contents.values())
             except parsing.RecordingError as error:
-                raise ReleaseError(str(error)) from error
+                raise BadInput(str(error)) from error
             _verify_hashes(manifest, contents)
             reaches.append(reach)
             progress(len(reaches), len(names))
@@ -76,7 +73,7 @@ def read(location: Path, manifest: Manifest, progress: Progress = no_progress) -
 def _verify_hashes(manifest: Manifest, contents: dict[str, bytes]) -> None:
     for file, content in contents.items():
         if hashlib.sha256(content).hexdigest() != manifest.files[file]:
-            raise ReleaseError(f"{file}: its SHA-256 is not the published one; download the release again")
+            raise BadInput(f"{file}: its SHA-256 is not the published one; download the release again")
 
 
 @contextmanager
@@ -91,7 +88,7 @@ def _open_reader(location: Path, manifest: Manifest) -> Iterator[Reader]:
         with zipfile.ZipFile(location) as archive:
             yield _zip_reader(archive, location, manifest)
     except zipfile.BadZipFile as error:
-        raise ReleaseError(f"{location} is not a valid zip file: {error}") from error
+        raise BadInput(f"{location} is not a valid zip file: {error}") from error
 
 
 def _folder_reader(folder: Path, manifest: Manifest) -> Reader:
@@ -100,7 +97,7 @@ def _folder_reader(folder: Path, manifest: Manifest) -> Reader:
         candidates.append(folder.resolve().parent)
     root = next((candidate for candidate in candidates if (candidate / "extracts" / "meta").is_dir()), None)
     if root is None:
-        raise ReleaseError(f"{folder} has no data/extracts/meta; name the release's top folder, data or extracts")
+        raise BadInput(f"{folder} has no data/extracts/meta; name the release's top folder, data or extracts")
     _check_complete({file for file in manifest.files if (root / file).is_file()}, folder, manifest)
 
     def reader(file: str) -> bytes:
@@ -113,7 +110,7 @@ def _folder_reader(folder: Path, manifest: Manifest) -> Reader:
 def _zip_reader(archive: zipfile.ZipFile, location: Path, manifest: Manifest) -> Reader:
     members: dict[str, zipfile.ZipInfo] = {}
     if len(archive.infolist()) > MAX_MEMBERS:
-        raise ReleaseError(f"{location} has more than {MAX_MEMBERS} members; this is not the authors' release")
+        raise BadInput(f"{location} has more than {MAX_MEMBERS} members; this is not the authors' release")
     for info in archive.infolist():
         match = MEMBER.fullmatch(info.filename)
         if match and match[1] in manifest.files:
@@ -126,7 +123,7 @@ def _zip_reader(archive: zipfile.ZipFile, location: Path, manifest: Manifest) ->
             with archive.open(members[file]) as stream:
                 return _size_checked(file, stream.read(MAX_FILE + 1))
         except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
-            raise ReleaseError(f"{file}: cannot be read from {location}: {error}") from error
+            raise BadInput(f"{file}: cannot be read from {location}: {error}") from error
 
     return reader
 
@@ -137,24 +134,24 @@ def _check_member(file: str, info: zipfile.ZipInfo, members: dict[str, zipfile.Z
     Also refuses compression methods whose few bytes can fill the memory, whatever size they state.
     """
     if file in members:
-        raise ReleaseError(f"{file}: the archive has it twice ({members[file].filename}, {info.filename})")
+        raise BadInput(f"{file}: the archive has it twice ({members[file].filename}, {info.filename})")
     if stat.S_ISLNK(info.external_attr >> 16):
-        raise ReleaseError(f"{file}: is a symbolic link in the archive")
+        raise BadInput(f"{file}: is a symbolic link in the archive")
     if info.flag_bits & 1:
-        raise ReleaseError(f"{file}: is encrypted in the archive")
+        raise BadInput(f"{file}: is encrypted in the archive")
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise ReleaseError(f"{file}: uses a compression method whose output size cannot be limited")
+        raise BadInput(f"{file}: uses a compression method whose output size cannot be limited")
     if info.file_size > MAX_FILE:
-        raise ReleaseError(f"{file}: unpacks to {info.file_size} bytes; the limit is {MAX_FILE}")
+        raise BadInput(f"{file}: unpacks to {info.file_size} bytes; the limit is {MAX_FILE}")
 
 
 def _size_checked(file: str, content: bytes) -> bytes:
     if len(content) > MAX_FILE:
-        raise ReleaseError(f"{file}: has more than {MAX_FILE} bytes, the limit")
+        raise BadInput(f"{file}: has more than {MAX_FILE} bytes, the limit")
     return content
 
 
 def _check_complete(files: Iterable[str], location: Path, manifest: Manifest) -> None:
     missing = sorted(manifest.files.keys() - set(files))
     if missing:
-        raise ReleaseError(f"{location} lacks {len(missing)} of {len(manifest.files)} files, first {missing[0]}")
+        raise BadInput(f"{location} lacks {len(missing)} of {len(manifest.files)} files, first {missing[0]}")

@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 import threadpoolctl
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.setting import ReachSource
 from dextron_bench.reaches.synthetic import fitting, generator
@@ -15,7 +16,7 @@ from dextron_bench.reaches.synthetic.parameters import REGIONS, Parameters
 from dextron_bench.storage import hashing
 
 
-class TooFewRegions(ValueError):
+class TooFewRegions(BadInput):
     """Reaches that leave out a start region, so that no model can be fitted to them."""
 
     def __init__(self, regions: int) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dextron_bench.errors import MissingPackage
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.synthetic.generator import COUNT, generate
 from dextron_bench.reaches.synthetic.parameters import shipped_parameters
@@ -43,7 +44,7 @@ REPEATS = 400  # Resamples of the bootstrap.
 LEVELS = (0.025, 0.975)
 
 
-class MissingClassifiers(ImportError):
+class MissingClassifiers(MissingPackage):
     """scikit-learn is not installed."""
 
     def __init__(self) -> None:

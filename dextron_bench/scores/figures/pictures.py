@@ -12,6 +12,7 @@ from matplotlib import rc_context, rcdefaults
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox, BboxBase
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic
 
 FORMATS = (".pdf", ".png", ".svg")
@@ -26,7 +27,7 @@ INLINE: Any = {  # For pictures inside the page: text stays text, and the backgr
 rcdefaults()  # A file `matplotlibrc` in the working folder, or of the user, changes no picture.
 
 
-class UnknownFormat(ValueError):
+class UnknownFormat(BadInput):
     """The suffix of a picture's file names no supported format."""
 
     def __init__(self, file: Path) -> None:

@@ -8,6 +8,7 @@ from ctypes.util import find_library
 from importlib import import_module
 from typing import Protocol
 
+from dextron_bench.errors import Failed
 from dextron_bench.world.simulator import import_triton
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # The library of each off-screen backend, best first.
@@ -18,7 +19,7 @@ INSTALL = (
 _drew: list[int] = []  # The process that created the first context: this one, or one that it was forked from.
 
 
-class NoGraphics(RuntimeError):
+class NoGraphics(Failed):
     """Off-screen rendering is not possible; the message says what to install or to change."""
 
 

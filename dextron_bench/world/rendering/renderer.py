@@ -14,6 +14,7 @@ from typing import Self
 
 import numpy as np
 
+from dextron_bench.errors import NotFound
 from dextron_bench.world.rendering import visuals
 from dextron_bench.world.rendering.context import INSTALL, Context, NoGraphics, create_context, refuse_fork
 from dextron_bench.world.simulator import mujoco
@@ -43,7 +44,7 @@ CAMERAS = {
 }
 
 
-class UnknownCamera(KeyError):
+class UnknownCamera(NotFound):
     """No camera has that name; the message lists the names."""
 
     def __init__(self, name: str, *others: str) -> None:

@@ -11,6 +11,7 @@ import onnx.numpy_helper
 import pytest
 import torch
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import policy_files, sandbox
 from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent
@@ -50,7 +51,7 @@ def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
     torch.save({"weights": 1}, file)
     with pytest.raises(AgentError, match="is not a TorchScript file"):
         play(str(file))
-    with pytest.raises(policy_files.BadPolicy, match=r"file ends in \.pt or \.onnx"):
+    with pytest.raises(BadInput, match=r"file ends in \.pt or \.onnx"):
         policy_files.load(tmp_path / "policy.pkl")
 
 

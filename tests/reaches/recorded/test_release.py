@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.recorded import cache as recorded_cache
-from dextron_bench.reaches.recorded.release import MAX_FILE, Manifest, ReleaseError
+from dextron_bench.reaches.recorded.release import MAX_FILE, Manifest
 from dextron_bench.reaches.recorded.release import read as read_release
 from tests.helpers.small_release import NAMES, SmallRelease
 
@@ -49,7 +50,7 @@ def test_a_zip_may_have_any_top_folder(small_release: SmallRelease, top: str):
 
 
 def import_error(location: Path, small_release: SmallRelease) -> str:
-    with pytest.raises(ReleaseError) as caught:
+    with pytest.raises(BadInput) as caught:
         recorded_cache.import_release(location, Manifest.load(small_release.manifest))
     assert not recorded_cache.cache_file().exists()
     return str(caught.value)
