@@ -102,8 +102,9 @@ def test_an_error_of_the_rollout_ends_all_processes_after_what_they_write(
 
 
 PROGRAM = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
+signal.signal(signal.SIGINT, signal.default_int_handler)  # A shell's job in the background would ignore it.
 sys.path.insert(0, {root!r})
 from dextron_bench.runs import recorder
 from tests.runs.test_recorder import CASES, EPISODES, SOURCE
