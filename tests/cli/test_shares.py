@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from dextron_bench.cli import main
 from dextron_bench.runs import evaluation_job, execution
 from dextron_bench.storage import provenance
+from dextron_bench.storage.provenance import Machine, Provenance
 from tests.helpers import tiny_training
 from tests.helpers.tiny_runs import constant_agent, forbidden
 from tests.helpers.tiny_training import TOY
@@ -31,8 +33,9 @@ def here(tiny_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def on_machine(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pretends that this process runs on the machine of that name."""
-    about = {"git": "abc", "machine": {"system": "Linux-6", "cpu": name, "cores": 2}, "versions": {"mujoco": "3"}}
-    monkeypatch.setattr(provenance, "collect", lambda physics: {**about, "physics": physics})
+    machine = Machine(system="Linux-6", cpu=name, cores=2)
+    about = Provenance(git="abc", versions={"mujoco": "3"}, machine=machine)
+    monkeypatch.setattr(provenance, "collect", lambda physics: replace(about, physics=physics))
 
 
 def contents(folder: Path) -> dict[str, bytes]:
