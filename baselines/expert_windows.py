@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from dextron_bench import Case, TrainingSetup, rollout
-from dextron_bench.experts.openings import EVERY, FAILS, NEAR, NO_DECISION, SUCCEEDS, Episode
+from dextron_bench.experts.openings import EVERY, FAILS, NEAR, NO_DECISION, SUCCEEDS, OpeningSteps
 from dextron_bench.world import task
 
 
-def play(setup: TrainingSetup, cases: Sequence[Case]) -> list[Episode]:
+def play(setup: TrainingSetup, cases: Sequence[Case]) -> list[OpeningSteps]:
     """The openings of the cases' settings, with outcomes from their windows; those without any success are left out."""
-    episodes: dict[int, Episode] = {}
+    episodes: dict[int, OpeningSteps] = {}
     for number, played in rollout(_Opening(), setup.source, cases, threads=setup.threads):
         states = played.states[:-1]
         episodes[number] = states, outcomes(cases[number], task.distance(states))

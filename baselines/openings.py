@@ -12,7 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from dextron_bench import Setting, TrainingSetup
-from dextron_bench.experts.openings import EVERY, NEAR, NO_DECISION, SUCCEEDS, TOGETHER, Episode, Openings, joined, play
+from dextron_bench.experts.openings import (
+    EVERY,
+    NEAR,
+    NO_DECISION,
+    SUCCEEDS,
+    TOGETHER,
+    Openings,
+    OpeningSteps,
+    joined,
+    play,
+)
 from dextron_bench.reaches.setting import OFFSET
 from dextron_bench.storage import atomic, hashing, tensors
 from dextron_bench.world import model, task
@@ -28,7 +38,7 @@ def settings_of(setup: TrainingSetup) -> list[Setting]:
     return list(dict.fromkeys(case.setting for case in setup.cases))
 
 
-def load(setup: TrainingSetup, settings: Sequence[Setting]) -> list[Episode]:
+def load(setup: TrainingSetup, settings: Sequence[Setting]) -> list[OpeningSteps]:
     """The opening of each setting, played or from its cache; raises DamagedFile.
 
     The cache has a file for each reach. So a killed call continues, and other choices of reaches share the files.
@@ -42,14 +52,14 @@ def load(setup: TrainingSetup, settings: Sequence[Setting]) -> list[Episode]:
     return [episodes[setting] for setting in settings]
 
 
-def rule_succeeds(episode: Episode, edge: float) -> bool:
+def rule_succeeds(episode: OpeningSteps, edge: float) -> bool:
     """True if closing succeeds at the first decision of an opening that lies within `edge` [m] of the bottle."""
     states, outcomes = episode
     within = outcomes[(outcomes != NO_DECISION) & (task.distance(states.astype(float)) < edge)]
     return bool(within.size) and within[0] == SUCCEEDS
 
 
-def load_nearby(setup: TrainingSetup, settings: Sequence[Setting], copies: int) -> list[list[Episode]]:
+def load_nearby(setup: TrainingSetup, settings: Sequence[Setting], copies: int) -> list[list[OpeningSteps]]:
     """The openings of `copies` settings near each setting; raises DamagedFile.
 
     They are drawn and kept in batches, so that trainings with more copies share the files of those with fewer.
@@ -90,7 +100,7 @@ def _play_missing(setup: TrainingSetup, groups: Sequence[tuple[Path, list[Settin
         waiting.clear()
 
 
-def _read(file: Path) -> list[Episode]:
+def _read(file: Path) -> list[OpeningSteps]:
     """The openings in a file; raises DamagedFile."""
     try:
         return Openings(**tensors.read(file)).episodes()

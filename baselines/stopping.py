@@ -14,7 +14,7 @@ from baselines.normalise import CLIP
 from baselines.stopping_trainer import EDGE
 from dextron_bench import Perceptron, Setting, Trainer, TrainingSetup
 from dextron_bench.errors import BadInput
-from dextron_bench.experts.openings import EVERY, NEAR, SUCCEEDS, Episode
+from dextron_bench.experts.openings import EVERY, NEAR, SUCCEEDS, OpeningSteps
 from dextron_bench.methods.exact import rounded
 from dextron_bench.world import task
 
@@ -82,12 +82,12 @@ class Stopping:
         episodes = self._by_forks(setup) if self.labels == "forks" else self._by_windows(setup)
         return stopping_trainer.StoppingTrainer(stopping_trainer.Decisions(episodes, setup.device), seeds, setup.device)
 
-    def _by_windows(self, setup: TrainingSetup) -> list[Episode]:
+    def _by_windows(self, setup: TrainingSetup) -> list[OpeningSteps]:
         """The openings of settings, with labels from the windows of their experts."""
         cases = list({case.setting: case for case in setup.cases}.values())
         return expert_windows.play(setup, cases[: self.settings or len(cases)])
 
-    def _by_forks(self, setup: TrainingSetup) -> list[Episode]:
+    def _by_forks(self, setup: TrainingSetup) -> list[OpeningSteps]:
         """The openings of settings, of settings near them and of generated ones, with labels that were tried."""
         settings = openings.settings_of(setup)
         played = openings.load(setup, settings)  # All of them, so that all numbers of settings share the files.
@@ -96,17 +96,17 @@ class Stopping:
         return [*played[:count], *chain.from_iterable(near[:count]), *self._generated(setup, settings[:count])]
 
     def _nearby(
-        self, setup: TrainingSetup, settings: Sequence[Setting], played: Sequence[Episode]
-    ) -> list[list[Episode]]:
+        self, setup: TrainingSetup, settings: Sequence[Setting], played: Sequence[OpeningSteps]
+    ) -> list[list[OpeningSteps]]:
         """For each setting (with its opening `played`) that the rule fails, openings near it that closing can solve."""
         failed = [row for row, episode in enumerate(played) if not openings.rule_succeeds(episode, EDGE)]
         near = openings.load_nearby(setup, [settings[row] for row in failed], self.nearby)
-        solvable: list[list[Episode]] = [[] for _ in settings]
+        solvable: list[list[OpeningSteps]] = [[] for _ in settings]
         for row, episodes in zip(failed, near, strict=True):
             solvable[row] = [episode for episode in episodes if (episode[1] == SUCCEEDS).any()]
         return solvable
 
-    def _generated(self, setup: TrainingSetup, settings: Sequence[Setting]) -> list[Episode]:
+    def _generated(self, setup: TrainingSetup, settings: Sequence[Setting]) -> list[OpeningSteps]:
         """The openings on reaches that are generated from the reaches of settings, if closing can succeed."""
         if not self.generated:
             return []

@@ -12,7 +12,7 @@ from torch.nn.functional import binary_cross_entropy_with_logits, logsigmoid, pa
 from baselines import pose_features, snapshot
 from baselines.networks import Stack
 from baselines.normalise import CLIP, EPSILON
-from dextron_bench.experts.openings import NO_DECISION, Episode
+from dextron_bench.experts.openings import NO_DECISION, OpeningSteps
 from dextron_bench.methods.learners import Arrays
 
 MEMBERS = 5  # Networks of an agent, whose outputs are averaged.
@@ -30,7 +30,7 @@ NEVER = -30.0  # The logit of closing where there is no decision.
 class Decisions:
     """The decisions of N openings, padded to D: scaled features (N, D, F); distance, outcome, validity, each (N, D)."""
 
-    def __init__(self, openings: Sequence[Episode], device: str) -> None:
+    def __init__(self, openings: Sequence[OpeningSteps], device: str) -> None:
         """Takes openings; `mean` and `deviation` (F,) scale the features."""
         episodes = [self._of(*opening) for opening in openings]
         seen = np.concatenate([features for features, _ in episodes])

@@ -147,7 +147,9 @@ STEPS: tuple[Step, ...] = (
             "recordings choose --runs {runs}/show --method exp rlil-0.1 sor stopping --into recordings",
         ),
         needs=(
-            *(SPLITS, f"{DATA}/success-synthetic.safetensors", SIM),
+            SPLITS,
+            f"{DATA}/success-synthetic.safetensors",
+            SIM,
             *(f"{WEIGHTS}/{label}/synthetic/seed0.safetensors" for label in SHOWN),
         ),
         makes=("recordings/*.rrd",),

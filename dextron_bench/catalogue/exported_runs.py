@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from msgspec import to_builtins
 
-from dextron_bench.catalogue.run_catalogue import Entry
+from dextron_bench.catalogue.run_catalogue import CataloguedRun
 from dextron_bench.runs import annotations, playing, result_files
 from dextron_bench.storage import run_times
 from dextron_bench.storage.atomic import DamagedFile
@@ -44,7 +44,7 @@ class ExportedRun:
     metrics: list[Metric] = field(default_factory=list)
 
 
-def collect(entries: Iterable[Entry]) -> tuple[list[ExportedRun], list[str]]:
+def collect(entries: Iterable[CataloguedRun]) -> tuple[list[ExportedRun], list[str]]:
     """Each seed of each entry, and a line for each seed that is left out because its files cannot be read."""
     exported, left_out = [], []
     for entry in entries:
@@ -56,7 +56,7 @@ def collect(entries: Iterable[Entry]) -> tuple[list[ExportedRun], list[str]]:
     return exported, left_out
 
 
-def _exported(entry: Entry, seed: int) -> ExportedRun:
+def _exported(entry: CataloguedRun, seed: int) -> ExportedRun:
     """A seed of an entry; raises DamagedFile, OSError."""
     run = RunFolder.of_seed(entry.folder, seed)
     about = {"method": entry.label, "reaches": entry.reaches, "seed": seed, "physics": entry.physics}
@@ -90,13 +90,13 @@ def _scores(run: RunFolder) -> Iterator[Metric]:
         yield Metric(f"{split}.success", sum(score == task.SUCCESS for score in scores) / len(scores))
 
 
-def _curve(entry: Entry, seed: int) -> Iterator[Metric]:
+def _curve(entry: CataloguedRun, seed: int) -> Iterator[Metric]:
     for point in entry.curves.get(seed, ()):
         yield Metric("val_curve.return", point.mean, point.epoch)
         yield Metric("val_curve.success", point.success, point.epoch)
 
 
-def _training(entry: Entry, seed: int) -> Iterator[Metric]:
+def _training(entry: CataloguedRun, seed: int) -> Iterator[Metric]:
     """The metrics of a seed's training, as far as it is; raises DamagedFile."""
     folders = [folder for folder, seeds in loop.training_folders(entry.folder).items() if seed in seeds]
     for row in (row for folder in folders for row in metric_rows.read(folder) if row.seed == seed):

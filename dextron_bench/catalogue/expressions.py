@@ -25,8 +25,12 @@ LONGEST = 1000  # Characters of an expression.
 KEYWORD = "return_"  # Stands for the column `return`, which is no name in Python.
 SPELLINGS = {"return": KEYWORD, "AND": "and", "OR": "or", "NOT": "not", "IN": "in", "=": "=="}
 ORDERS = {
-    **{ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le},
-    **{ast.Gt: operator.gt, ast.GtE: operator.ge},
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
 }
 ALLOWED = "names of columns, texts, numbers, comparisons, in, and, or, not"
 

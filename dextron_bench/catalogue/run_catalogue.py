@@ -26,7 +26,7 @@ VAL = "val"
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CataloguedRun:
     """All seeds of a method with its settings on one source of reaches.
 
     `scores` holds, by split, the scores (seeds, rows) of the seeds that have played it. `curves` holds, by seed, the
@@ -73,7 +73,7 @@ class Entry:
         return float("nan")
 
 
-def entries(runs: Path) -> list[Entry]:
+def entries(runs: Path) -> list[CataloguedRun]:
     """The entries of a folder of runs, in the order of their names; raises DamagedFile."""
     groups: dict[Path, list[RunFolder]] = defaultdict(list)
     for run in run_folders(runs):
@@ -83,7 +83,7 @@ def entries(runs: Path) -> list[Entry]:
     return [_entry(folder, sorted(members, key=lambda run: run.seed), left) for folder, members in groups.items()]
 
 
-def find(all_entries: Iterable[Entry], name: str) -> Entry:
+def find(all_entries: Iterable[CataloguedRun], name: str) -> CataloguedRun:
     """The entry with a label, or with a label and a source of reaches; raises NotFound."""
     known = list(all_entries)
     matching = [entry for entry in known if name in (entry.name, entry.label)]
@@ -96,12 +96,12 @@ def find(all_entries: Iterable[Entry], name: str) -> Entry:
 
 def _entry(
     folder: Path, members: Sequence[RunFolder], left: Mapping[tuple[str, str], jobs.UnfinishedTraining]
-) -> Entry:
+) -> CataloguedRun:
     label, reaches = folder.parts[-2:]
     config = records.read(members[0].config, RunConfig)
     results = [result_files.read_result(run.result) for run in members if run.result.exists()]
     notes = annotations.read(folder)
-    return Entry(
+    return CataloguedRun(
         label,
         reaches,
         folder,

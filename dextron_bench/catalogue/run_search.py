@@ -13,7 +13,7 @@ from dextron_bench.errors import BadInput
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dextron_bench.catalogue.run_catalogue import Entry
+    from dextron_bench.catalogue.run_catalogue import CataloguedRun
 
 SCORES = ("return", "success")
 VAL = "val"  # Orders by the mean return on the split of this name, whatever the split is.
@@ -49,7 +49,7 @@ class RunFilter:
         if not any(known.startswith(self.state) or self.state.startswith(known) for known in STATES):
             raise BadInput(f"--state {self.state!r}: choose from {', '.join(STATES)}")
 
-    def passes(self, entry: Entry) -> bool:
+    def passes(self, entry: CataloguedRun) -> bool:
         """True for a run that the filter selects."""
         wanted = [text.partition("=") for text in self.setting]
         return (
@@ -62,7 +62,7 @@ class RunFilter:
         )
 
 
-def matching(entries: Iterable[Entry], run_filter: RunFilter, split: str) -> list[Entry]:
+def matching(entries: Iterable[CataloguedRun], run_filter: RunFilter, split: str) -> list[CataloguedRun]:
     """The entries that a filter selects; `split` is the split of the scores. Raises BadExpression."""
     from dextron_bench.catalogue import expressions  # Loads pandas, which the flags of commands do not need.
 
@@ -71,7 +71,7 @@ def matching(entries: Iterable[Entry], run_filter: RunFilter, split: str) -> lis
     return [passing[place] for place in expressions.filtered(table, run_filter.where, map(str, table)).index]
 
 
-def ordered(entries: Iterable[Entry], order: str, split: str) -> list[Entry]:
+def ordered(entries: Iterable[CataloguedRun], order: str, split: str) -> list[CataloguedRun]:
     """Entries by name, with the newest first by "date", with the highest score on a split first by "return", "success".
 
     By "val" the highest mean return on `val` comes first. Entries without the score come last. Raises BadInput.
@@ -83,14 +83,14 @@ def ordered(entries: Iterable[Entry], order: str, split: str) -> list[Entry]:
     return [known[place] for place in table.sort_values(order, ascending=order == "name", kind="stable").index]
 
 
-def check_split(entries: Sequence[Entry], split: str) -> None:
+def check_split(entries: Sequence[CataloguedRun], split: str) -> None:
     """Raises BadInput if runs have played splits, but no run the given one."""
     played = dict.fromkeys(name for entry in entries for name in entry.scores)
     if played and split not in {VAL, *played}:
         raise BadInput(f"no run has played {split!r}; there are {', '.join(played)}")
 
 
-def differing_settings(entries: Sequence[Entry]) -> list[str]:
+def differing_settings(entries: Sequence[CataloguedRun]) -> list[str]:
     """Names of the settings in which entries differ, with "code" and "physics" if these do."""
     names = list(dict.fromkeys(name for entry in entries for name in entry.settings))
     differing = [name for name in names if len({repr(entry.settings.get(name)) for entry in entries}) > 1]
@@ -98,16 +98,22 @@ def differing_settings(entries: Sequence[Entry]) -> list[str]:
     return differing + [name for name, values in others.items() if len(set(map(repr, values))) > 1]
 
 
-def _table(entries: Sequence[Entry], split: str) -> pd.DataFrame:
+def _table(entries: Sequence[CataloguedRun], split: str) -> pd.DataFrame:
     """A row for each entry: what `runs list` shows of it, and its settings; the index is its place."""
     import pandas as pd
 
     rows = [
         {
-            **{"name": entry.label, "reaches": entry.reaches, "state": entry.state, "seeds": len(entry.seeds)},
-            **{VAL: entry.score(VAL), **{what: entry.score(split, what) for what in SCORES}},
-            **{"date": entry.changed.astimezone(UTC).isoformat() if entry.changed else ""},
-            **{"tags": " ".join(entry.tags), "note": entry.note, "physics": entry.physics},
+            "name": entry.label,
+            "reaches": entry.reaches,
+            "state": entry.state,
+            "seeds": len(entry.seeds),
+            VAL: entry.score(VAL),
+            **{what: entry.score(split, what) for what in SCORES},
+            "date": entry.changed.astimezone(UTC).isoformat() if entry.changed else "",
+            "tags": " ".join(entry.tags),
+            "note": entry.note,
+            "physics": entry.physics,
         }
         for entry in entries
     ]

@@ -46,34 +46,55 @@ Commands = Mapping[str, type[Command] | Group]
 RUNS = Group(
     "Runs: list, show and compare them, find the best, mark them, put them away, export them; methods to run.",
     {
-        **{"list": runs_list.List, "show": runs_show.Show, "compare": runs_compare.Compare, "best": best.Best},
-        **{"tag": tag.Tag, "note": note.Note, "archive": archive.Archive, "rm": rm.Remove},
-        **{"export": runs_export.Export, "methods": methods.Methods},
+        "list": runs_list.List,
+        "show": runs_show.Show,
+        "compare": runs_compare.Compare,
+        "best": best.Best,
+        "tag": tag.Tag,
+        "note": note.Note,
+        "archive": archive.Archive,
+        "rm": rm.Remove,
+        "export": runs_export.Export,
+        "methods": methods.Methods,
     },
 )
 LEADERBOARD = Group(
     "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
     "add a submission to it; play fresh settings and tracks.",
     {
-        **{"show": show.Show, "build": build.Build, "serve": serve.Serve, "verify": verify.Verify, "add": add.Add},
-        **{"fresh": fresh.Fresh, "tracks": tracks.Tracks},
+        "show": show.Show,
+        "build": build.Build,
+        "serve": serve.Serve,
+        "verify": verify.Verify,
+        "add": add.Add,
+        "fresh": fresh.Fresh,
+        "tracks": tracks.Tracks,
     },
 )
 DATA = Group(
     "Reaches: import or download the recorded ones, describe a source, evaluate the synthetic ones. Experts and "
     "splits: search, build, list. Episodes: export them for offline learning.",
     {
-        **{"import": recorded.Import, "fetch": recorded.Fetch, "info": info.Info, "agreement": agreement.Agreement},
-        **{"likeness": likeness.Likeness, "mc": mc.MonteCarlo, "splits": splits.Splits, "export": data_export.Export},
+        "import": recorded.Import,
+        "fetch": recorded.Fetch,
+        "info": info.Info,
+        "agreement": agreement.Agreement,
+        "likeness": likeness.Likeness,
+        "mc": mc.MonteCarlo,
+        "splits": splits.Splits,
+        "export": data_export.Export,
     },
 )
 SECTIONS: dict[str, Commands] = {  # By heading of the help.
     "train and play": {
-        **{"run": run.Run, "eval": evaluation.Eval},
+        "run": run.Run,
+        "eval": evaluation.Eval,
         "sweep": Group("", {"cross-validate": cross_validate.CrossValidate}, sweep.Sweep),
     },
     "look": {
-        **{"runs": RUNS, "view": view.View, "browse": browse.Browse},
+        "runs": RUNS,
+        "view": view.View,
+        "browse": browse.Browse,
         "recordings": Group(
             "Recordings: list them, export one as a film or a table, choose a few from the runs.",
             {"list": recordings_list.List, "export": recordings_export.Export, "choose": choose.Choose},
@@ -82,15 +103,20 @@ SECTIONS: dict[str, Commands] = {  # By heading of the help.
     },
     "compare and submit": {
         "compare": Group("", {"plan": plan.Plan}, compare.Compare),
-        **{"leaderboard": LEADERBOARD, "new-agent": new_agent.NewAgent, "check": check.Check, "submit": submit.Submit},
+        "leaderboard": LEADERBOARD,
+        "new-agent": new_agent.NewAgent,
+        "check": check.Check,
+        "submit": submit.Submit,
     },
     "data": {
         "data": DATA,
         "success": Group(
             "The success model: generate its data set, train it, evaluate it, explain episodes with it.",
             {
-                **{"data": success_data.Data, "train": train.Train},
-                **{"eval": success_eval.Eval, "explain": explain.Explain},
+                "data": success_data.Data,
+                "train": train.Train,
+                "eval": success_eval.Eval,
+                "explain": explain.Explain,
             },
         ),
     },

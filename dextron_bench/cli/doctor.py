@@ -36,12 +36,33 @@ class Doctor:
 
 
 PACKAGES = (
-    *("mujoco", "dm-control", "gymnasium", "numpy", "scipy", "torch", "safetensors"),
-    *("pandas", "pyarrow", "rerun-sdk", "matplotlib", "pillow", "tyro", "rich", "msgspec", "threadpoolctl"),
+    "mujoco",
+    "dm-control",
+    "gymnasium",
+    "numpy",
+    "scipy",
+    "torch",
+    "safetensors",
+    "pandas",
+    "pyarrow",
+    "rerun-sdk",
+    "matplotlib",
+    "pillow",
+    "tyro",
+    "rich",
+    "msgspec",
+    "threadpoolctl",
 )
 EXTRAS = {  # By package: the extra that installs it.
-    **{"minari": "minari", "av": "video", "onnxruntime": "onnx", "optuna": "sweep", "mlflow-skinny": "mlflow"},
-    **{"tensorboard": "tensorboard", "trackio": "trackio", "wandb": "wandb", "ray": "cluster"},
+    "minari": "minari",
+    "av": "video",
+    "onnxruntime": "onnx",
+    "optuna": "sweep",
+    "mlflow-skinny": "mlflow",
+    "tensorboard": "tensorboard",
+    "trackio": "trackio",
+    "wandb": "wandb",
+    "ray": "cluster",
 }
 RENDERERS = ("egl", "osmesa", "glfw")
 TIMEOUT = 120.0  # [s] for one renderer.

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dextron_bench.experts import policies
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.world import task
 from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.engine import Engine
@@ -26,7 +26,7 @@ class ExpertBatch:
     Without a `bottle` they meet the model's.
     """
 
-    path: Path
+    path: Trajectory
     gain: float
     criticals: np.ndarray
     bottle: Bottle | None = None

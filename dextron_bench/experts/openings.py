@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import task
 from dextron_bench.world.bottle import Bottle
@@ -19,7 +19,7 @@ FIRST_TRIED = 3  # Every third decision is tried; then the decisions between a s
 TOGETHER = 96  # Settings that are played together.
 SLOTS = 1024
 NO_DECISION, FAILS, SUCCEEDS = -1, 0, 1
-Episode = tuple[np.ndarray, np.ndarray]  # States (T, 48) and outcomes (T,) of an opening.
+OpeningSteps = tuple[np.ndarray, np.ndarray]  # States (T, 48) and outcomes (T,) of an opening.
 Begin = Callable[[np.ndarray, np.ndarray], np.ndarray]  # Starts numbered openings in slots; returns their states.
 
 
@@ -43,14 +43,14 @@ class Openings:
         """The rows of an episode."""
         return slice(self.starts[episode], self.starts[episode + 1])
 
-    def episodes(self) -> list[Episode]:
+    def episodes(self) -> list[OpeningSteps]:
         """States and outcomes of each episode."""
         return [(self.states[rows], self.outcomes[rows]) for rows in map(self.rows, range(len(self)))]
 
 
 def play(
     source: Source, settings: Sequence[Setting], threads: int = 0, bottles: Sequence[Bottle] = ()
-) -> list[Episode]:
+) -> list[OpeningSteps]:
     """The openings of some settings; `bottles` has one for each, or none if all have the model's."""
     engine = Engine(SLOTS, threads)
     return [
@@ -64,14 +64,14 @@ def play(
     ]
 
 
-def joined(episodes: Sequence[Episode]) -> Openings:
+def joined(episodes: Sequence[OpeningSteps]) -> Openings:
     """Openings, one after the other."""
     states, outcomes = zip(*episodes, strict=True)
     starts = np.concatenate([[0], np.cumsum([len(part) for part in states])])
     return Openings(np.concatenate(states).astype(np.float32), np.concatenate(outcomes), starts)
 
 
-def _play_together(engine: Engine, paths: Sequence[Path], bottles: Sequence[Bottle]) -> Iterator[Episode]:
+def _play_together(engine: Engine, paths: Sequence[Trajectory], bottles: Sequence[Bottle]) -> Iterator[OpeningSteps]:
     """The opening of each path."""
 
     def begin(slots: np.ndarray, numbers: np.ndarray) -> np.ndarray:

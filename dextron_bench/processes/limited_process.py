@@ -24,7 +24,8 @@ except ImportError:  # On Windows.
 GIBIBYTE = 2**30  # [bytes]
 SINGLE_THREADED = {
     **dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS"), "1"),
-    **{"ARROW_DEFAULT_MEMORY_POOL": "system", "MALLOC_ARENA_MAX": "2"},  # Arenas: 64 MiB reserved for each thread.
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
+    "MALLOC_ARENA_MAX": "2",  # Arenas: 64 MiB reserved for each thread.
 }
 START = 600.0  # [s] in which a process must import what it needs, also from a slow disk.
 WORDS = 30  # The last words of the process's errors that a message has.

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from dextron_bench.errors import BadInput
-from dextron_bench.reaches.reach import DECIMALS, Path
+from dextron_bench.reaches.reach import DECIMALS, Trajectory
 from dextron_bench.reaches.setting import Setting, Stratum, UnknownReach
 from dextron_bench.reaches.timing import CONTROL_STEP
 
@@ -96,12 +96,12 @@ class MinjerkSource:
         """Draws the setting of one episode, uniformly over `names`."""
         return Setting(self.names[rng.integers(REACHES)], 0.0, 0.0, 0.0)
 
-    def path(self, setting: Setting) -> Path:
+    def path(self, setting: Setting) -> Trajectory:
         """The path of a setting. Raises UnknownReach, and BadInput if the setting has an offset or noise."""
         if (setting.offset_x, setting.offset_y, setting.duration_noise) != (0.0, 0.0, 0.0):
             raise BadInput(f"{setting}: minjerk reaches take no offset and no duration noise; set all three to 0")
         positions = carrier_positions(self._draw(setting.reach))
-        return Path(positions, np.tile(np.round(ORIENTATION, DECIMALS), (len(positions), 1)))
+        return Trajectory(positions, np.tile(np.round(ORIENTATION, DECIMALS), (len(positions), 1)))
 
     def duration(self, setting: Setting) -> float:
         """Time for which the hand moves [s], the same in all settings."""

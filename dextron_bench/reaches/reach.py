@@ -76,7 +76,7 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
+class Trajectory:
     """Carrier poses at every control step: positions [m] (T, 3) and unit quaternions wxyz (T, 4)."""
 
     positions: np.ndarray
@@ -114,7 +114,7 @@ def palm_centre(positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
     return positions + rotation.rotate(quaternions, PALM_AHEAD + PALM_CENTRE)
 
 
-def path(reach: Reach, offset_x: float, offset_y: float, duration_noise: float) -> Path:
+def path(reach: Reach, offset_x: float, offset_y: float, duration_noise: float) -> Trajectory:
     """The path of one setting: resampled, scaled in time, centred on the bottle, and shifted by the offsets [m].
 
     Raises BadInput if the noise makes the reach faster than the recording.
@@ -133,4 +133,4 @@ def path(reach: Reach, offset_x: float, offset_y: float, duration_noise: float) 
     centre = palm_centre(positions[settled].mean(axis=0), rotation.mean(quaternions[settled]))
     positions[:, 0] += offset_x - centre[0]
     positions[:, 1] += offset_y - centre[1]
-    return Path(np.round(positions, DECIMALS), np.round(quaternions, DECIMALS))
+    return Trajectory(np.round(positions, DECIMALS), np.round(quaternions, DECIMALS))

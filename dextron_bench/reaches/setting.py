@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from dextron_bench.errors import BadInput, NotFound
-from dextron_bench.reaches.reach import Path, Reach, path, scaled_duration
+from dextron_bench.reaches.reach import Reach, Trajectory, path, scaled_duration
 
 OFFSET = 0.06  # [m] offsets are uniform in [-OFFSET, OFFSET] (table I).
 LIMITS = {"offset_x": 1.0, "offset_y": 1.0, "duration_noise": 10.0}  # Largest sizes [m, m, standard deviations].
@@ -74,7 +74,7 @@ class Source(Protocol):
         """Draws the setting of one episode (paper, II.B)."""
         ...
 
-    def path(self, setting: Setting) -> Path:
+    def path(self, setting: Setting) -> Trajectory:
         """The path that the hand follows in that setting. Raises UnknownReach or BadInput."""
         ...
 
@@ -121,7 +121,7 @@ class ReachSource:
             if scaled_duration(recorded, noise) >= recorded:
                 return Setting(name, float(offset_x), float(offset_y), noise)
 
-    def path(self, setting: Setting) -> Path:
+    def path(self, setting: Setting) -> Trajectory:
         """The scaled, centred and shifted path of a setting. Raises UnknownReach or BadInput."""
         return path(self.reach(setting.reach), setting.offset_x, setting.offset_y, setting.duration_noise)
 

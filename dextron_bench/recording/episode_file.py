@@ -52,7 +52,7 @@ class BrokenRecording(BadInput):
 def write(
     file: Path,
     episode: Episode,
-    path: reach.Path,
+    path: reach.Trajectory,
     properties: Mapping[str, Value],
     predictions: StepPredictions | None = None,
 ) -> str:

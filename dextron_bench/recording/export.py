@@ -37,7 +37,7 @@ def export(source: Path, into: Path, style: film.FilmStyle, progress: Progress =
         raise UnknownSuffix(into)
     episode = summaries.read_safely(source).episode
     if suffix in FILMS:
-        draw = Overlay(episode, style.height).draw if style.overlay and style.height >= SMALLEST else film.undrawn
+        draw = Overlay(episode, style.height).draw if style.overlay and style.height >= SMALLEST else film.unchanged
         atomic.write_atomically(into, lambda part: FILMS[suffix](part, episode.states, style, progress, draw))
     elif suffix == ".csv":
         atomic.write_atomically(into, lambda part: step_table(episode).to_csv(part, index=False))

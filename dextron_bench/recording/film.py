@@ -27,7 +27,7 @@ QUALITY = "18"  # Constant rate factor of x264: a lower value gives a better and
 Draw = Callable[[np.ndarray, int], np.ndarray]
 
 
-def undrawn(frame: np.ndarray, index: int) -> np.ndarray:
+def unchanged(frame: np.ndarray, index: int) -> np.ndarray:
     """The frame itself."""
     return frame
 
@@ -73,7 +73,7 @@ def shown_steps(count: int, rate: float, speed: float) -> tuple[list[int], float
 
 
 def mp4(
-    file: Path, states: np.ndarray, style: FilmStyle, progress: Progress = no_progress, draw: Draw = undrawn
+    file: Path, states: np.ndarray, style: FilmStyle, progress: Progress = no_progress, draw: Draw = unchanged
 ) -> None:
     """Writes states (T, 48) as H.264 in MP4, whatever the file's suffix; raises Failed, NoGraphics.
 
@@ -90,7 +90,7 @@ def mp4(
 
 
 def gif(
-    file: Path, states: np.ndarray, style: FilmStyle, progress: Progress = no_progress, draw: Draw = undrawn
+    file: Path, states: np.ndarray, style: FilmStyle, progress: Progress = no_progress, draw: Draw = unchanged
 ) -> None:
     """Like `mp4`, as a looping GIF with one palette; raises NoGraphics."""
     shown, rate = shown_steps(len(states), RATES[".gif"], style.speed)
@@ -106,7 +106,7 @@ def gif(
 
 
 def _frames(
-    states: np.ndarray, shown: Sequence[int], style: FilmStyle, draw: Draw = undrawn, progress: Progress = no_progress
+    states: np.ndarray, shown: Sequence[int], style: FilmStyle, draw: Draw = unchanged, progress: Progress = no_progress
 ) -> Iterator[np.ndarray]:
     with renderer.Renderer(style.width, style.height, supersampling=1) as frame_renderer:
         for done, index in enumerate(shown, start=1):

@@ -24,7 +24,7 @@ Connect = Callable[[rr.RecordingStream], None]  # Connects a stream to a viewer 
 class LiveView:
     """One episode in the viewer, step by step: an `Observer` of `dextron_bench.success.live`."""
 
-    def __init__(self, connect: Connect, name: str, path: reach.Path, about: Mapping[str, object]) -> None:
+    def __init__(self, connect: Connect, name: str, path: reach.Trajectory, about: Mapping[str, object]) -> None:
         """Shows the scene and the palm's path, and a text with the entries of `about`."""
         rr.set_strict_mode(True)
         self._stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)

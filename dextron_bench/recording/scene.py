@@ -53,7 +53,7 @@ def chunks(states: np.ndarray, first: int = 0) -> Iterable[Chunk]:
     yield Chunk.from_columns(TRACE, ends, rr.LineStrips3D.columns(strips=segments))
 
 
-def planned_path(path: reach.Path) -> Chunk:
+def planned_path(path: reach.Trajectory) -> Chunk:
     """The planned path of the palm's centre."""
     points = reach.palm_centre(path.positions, path.quaternions)
     return static("/world/path", rr.LineStrips3D([points], radii=[0.0012], colors=[PATH_COLOUR]))

@@ -122,7 +122,8 @@ def align_all(names: Sequence[str], results: Sequence[Results], split: str, reac
     first, second = align((names[0], names[1]), (results[0], results[1]), split, reaches)
     others = zip(names[2:], results[2:], strict=True)
     return [
-        *(first, second),
+        first,
+        second,
         *(align((first.name, name), (results[0], seeds), split, first.reaches)[1] for name, seeds in others),
     ]
 

@@ -29,7 +29,7 @@ class Noise:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class SampleSize:
     """The fewest settings that show the difference with so many seeds for each method of several.
 
     `settings` is None if MOST settings are too few. `episodes` counts the episodes of both methods.
@@ -68,17 +68,17 @@ def detectable(known: Noise, settings: int, seeds: int) -> float:
     return paired.detectable([Part(between, settings - 1.0), *(paired.pooled(means) if seeds > 1 else [])])
 
 
-def plans(known: Noise, difference: float, seeds: Sequence[int]) -> list[Plan]:
+def plans(known: Noise, difference: float, seeds: Sequence[int]) -> list[SampleSize]:
     """A plan for each number of seeds; one plan if no method has several seeds."""
     return [_plan(known, difference, number) for number in (seeds if known.seeds else [1])]
 
 
-def _plan(known: Noise, difference: float, seeds: int) -> Plan:
+def _plan(known: Noise, difference: float, seeds: int) -> SampleSize:
     if detectable(known, MOST, seeds) > difference:
-        return Plan(seeds, None, None)
+        return SampleSize(seeds, None, None)
     low, high = 1, MOST  # Too few, and enough.
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if detectable(known, middle, seeds) <= difference else (middle, high)
     singles = 2 - len(known.seeds)
-    return Plan(seeds, high, high * (singles + seeds * len(known.seeds)))
+    return SampleSize(seeds, high, high * (singles + seeds * len(known.seeds)))

@@ -39,7 +39,7 @@ Board = dict[str, list[Seed]]  # By method: what each of its seeds scored on one
 
 
 @dataclass(frozen=True, slots=True)
-class Fresh:
+class FreshReturn:
     """What a method scores on fresh settings (seeds, settings), and how much less that is than on known ones."""
 
     scores: np.ndarray
@@ -104,8 +104,13 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
     ceiling = next((scores[method].mean() for method in registry.CEILINGS if method in scores), np.nan)
     for method, returns in scores.items():
         yield {
-            **{"reaches": reaches, "split": split, "version": digest[:8]},
-            **{"rank": ranks.get(method, np.nan), "method": method, "seeds": len(returns), "episodes": returns.size},
+            "reaches": reaches,
+            "split": split,
+            "version": digest[:8],
+            "rank": ranks.get(method, np.nan),
+            "method": method,
+            "seeds": len(returns),
+            "episodes": returns.size,
             **_estimates(method, returns, regions),
             "regret": ceiling - returns.mean(),
             **_endings([seed.known for seed in board[method]]),
@@ -113,16 +118,16 @@ def _rows(key: tuple[str, str, str], board: Board) -> Iterator[dict[str, Any]]:
         }
 
 
-def _fresh(seeds: Sequence[Seed], known: np.ndarray) -> Fresh | None:
+def _fresh(seeds: Sequence[Seed], known: np.ndarray) -> FreshReturn | None:
     """The scores of a method on fresh settings; None if some seed has none, or if seeds played different ones."""
     played = [seed.fresh for seed in seeds if seed.fresh]
     if len(played) < len(seeds) or len({one.digest for one in played}) > 1:
         return None
     scores = np.array([one.scores for one in played], float)
-    return Fresh(scores, paired.gap(known, scores))
+    return FreshReturn(scores, paired.gap(known, scores))
 
 
-def _fresh_columns(fresh: Fresh | None) -> dict[str, float]:
+def _fresh_columns(fresh: FreshReturn | None) -> dict[str, float]:
     """Mean return on fresh settings and gap with their intervals, and whether the gap is beyond noise."""
     if fresh is None:
         return {"marked": False}

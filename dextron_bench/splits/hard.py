@@ -91,7 +91,7 @@ def rule_scores(scanner: Scanner, rows: pd.DataFrame, distances: np.ndarray) -> 
     return scanner.play(rows.assign(gain=FULL_SPEED), distances / first[:, None])
 
 
-def first_distance(path: reach.Path) -> float:
+def first_distance(path: reach.Trajectory) -> float:
     """Horizontal distance of the palm's centre from the bottle at the start of a path [m]."""
     centre = path.positions[0] + reach.PALM_AHEAD + rotation.rotate(path.quaternions[0], reach.PALM_CENTRE)
     return float(np.sqrt((centre[:2] ** 2).sum()))

@@ -18,7 +18,12 @@ from dextron_bench.errors import BadInput
 PART = ".part"  # Ending of the names of files and folders that are not complete; these names start with a dot.
 ABANDONED = 24 * 3600.0  # [s] since the last change of a temporary file whose process has surely ended.
 LACKING = {  # What a file system answers to a call that it does not have; a full disk or a fault answers otherwise.
-    *(errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EBADF, errno.EROFS),
+    errno.EINVAL,
+    errno.ENOSYS,
+    errno.EOPNOTSUPP,
+    errno.ENOTSUP,
+    errno.EBADF,
+    errno.EROFS,
 }
 NO_LINKS = LACKING | {errno.EPERM, errno.EACCES, errno.EMLINK, errno.EXDEV}  # Of `os.link`, where files can be made.
 

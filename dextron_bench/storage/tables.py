@@ -51,7 +51,11 @@ SETTING: Columns = {"reach": texts, "offset_x": finite, "offset_y": finite, "dur
 EPISODES: Columns = {  # Of a run.
     **SETTING,
     **dict.fromkeys(("split", "digest", "failure", "cause"), texts),
-    **{"row": counts, "length": counts, "success": flags, "score": returns, "closing_lag": finite_or_missing},
+    "row": counts,
+    "length": counts,
+    "success": flags,
+    "score": returns,
+    "closing_lag": finite_or_missing,
 }
 CASES: Columns = {**SETTING, "split": texts, "gain": finite, "critical": finite}  # Of fresh settings.
 FRESH_EPISODES: Columns = {**EPISODES, **CASES}

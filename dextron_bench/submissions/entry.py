@@ -17,8 +17,11 @@ from dextron_bench.world import model
 
 FOLDER = "submissions"  # In the folder of runs.
 MANIFEST_KINDS: dict[str, AgentKind] = {
-    **{"method": "method", "module": "code", "file": "code"},
-    **{"policy": "policy", "command": "exec"},
+    "method": "method",
+    "module": "code",
+    "file": "code",
+    "policy": "policy",
+    "command": "exec",
 }
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.reaches.reach import PALM_AHEAD, Path
+from dextron_bench.reaches.reach import PALM_AHEAD, Trajectory
 from dextron_bench.world import model, task
 from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.bottles import Bottles, model_bottle
@@ -58,7 +58,7 @@ class Engine:
         self._mocap_quat = self._batch.bind("mocap_quat")
         self._batch.reset()
         self._initial_state = self._batch.state[0].copy()
-        self._progress = task.Progress.empty(slots)
+        self._progress = task.EpisodeState.empty(slots)
         poses = task.STEP_LIMIT + 1
         self._positions = np.zeros((slots, poses, 3))
         self._quaternions = np.zeros((slots, poses, 4))
@@ -68,7 +68,7 @@ class Engine:
         """Number of slots."""
         return len(self._qpos)
 
-    def begin(self, ids: np.ndarray, paths: Sequence[Path], bottles: Sequence[Bottle] = ()) -> np.ndarray:
+    def begin(self, ids: np.ndarray, paths: Sequence[Trajectory], bottles: Sequence[Bottle] = ()) -> np.ndarray:
         """Begins an episode along a path in each slot of `ids` (n,), and returns the first states (n, 48).
 
         Without `bottles`, one for each slot, the episodes have the model's bottle.

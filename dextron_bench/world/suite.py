@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dextron_bench.errors import MissingPackage
-from dextron_bench.reaches.reach import PALM_AHEAD, Path
+from dextron_bench.reaches.reach import PALM_AHEAD, Trajectory
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.world import model, simulator, task
 from dextron_bench.world.engine import DIVERGED, STATE_BOUND, UNSTABLE
@@ -90,7 +90,7 @@ class Physics(dm_mujoco.Physics):
         """A copy of the state, shape (1, 48)."""
         return np.concatenate([self.data.qpos, self.data.qvel])[None]
 
-    def move_carrier(self, path: Path, step: int) -> None:
+    def move_carrier(self, path: Trajectory, step: int) -> None:
         """Moves the palm's carrier to the pose of a path at a control step, or to its last pose."""
         pose = min(step, len(path) - 1)
         self.data.mocap_pos[0] = path.positions[pose]
@@ -109,7 +109,7 @@ class Grasp(control.Task):
 
     def __init__(self, settings: SettingQueue, rng: np.random.Generator) -> None:
         self._settings, self._rng = settings, rng
-        self._progress = task.Progress.empty(1)
+        self._progress = task.EpisodeState.empty(1)
         self._outcome = (0.0, False, False)
 
     def initialize_episode(self, physics: Physics) -> None:

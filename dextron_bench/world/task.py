@@ -76,7 +76,7 @@ def commands(actions: np.ndarray) -> np.ndarray:
 
 
 @dataclass(slots=True)
-class Progress:
+class EpisodeState:
     """Progress of N episodes, on which rewards and ends depend in addition to the states; each array (N,).
 
     `step` counts control steps. `left` is the number of countdown steps that remain, -1 before the countdown. `last` is
@@ -90,7 +90,7 @@ class Progress:
     raised: np.ndarray
 
     @classmethod
-    def empty(cls, n: int) -> Progress:
+    def empty(cls, n: int) -> EpisodeState:
         """Progress of N episodes that have not begun."""
         return cls(np.zeros(n, int), np.full(n, -1), np.zeros(n, int), np.zeros(n))
 

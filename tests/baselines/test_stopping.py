@@ -14,7 +14,7 @@ from baselines import generated_reaches, openings, pose_features, stopping_train
 from baselines.stopping import Stopping, StoppingAgent
 from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Episode, Openings
+from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Openings, OpeningSteps
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import Arrays, TrainingSetup
 from dextron_bench.reaches.setting import OFFSET, Setting
@@ -75,7 +75,7 @@ def test_more_nearby_settings_begin_with_the_fewer_ones_and_share_their_files(
     """Each setting's own three and six copies, distinguished by what a fake play returns."""
     played: list[Setting] = []
 
-    def play(source: object, settings: Sequence[Setting], threads: int) -> list[Episode]:
+    def play(source: object, settings: Sequence[Setting], threads: int) -> list[OpeningSteps]:
         played.extend(settings)
         return [(np.full((1, model.STATE), setting.offset_x), np.zeros(1, np.int8)) for setting in settings]
 

@@ -18,7 +18,7 @@ from dextron_bench.evaluation import rollout as evaluation_rollout
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import policies
 from dextron_bench.experts.policies import ExpertAgent
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.world import model
 from dextron_bench.world.bottle import Bottle
 from dextron_bench.world.engine import Engine, Step
@@ -49,7 +49,7 @@ class RecordingEngine(Engine):
 
     tape: Tape
 
-    def begin(self, ids: np.ndarray, paths: Sequence[Path], bottles: Sequence[Bottle] = ()) -> np.ndarray:
+    def begin(self, ids: np.ndarray, paths: Sequence[Trajectory], bottles: Sequence[Bottle] = ()) -> np.ndarray:
         """Like the engine's method, and stores the state rows."""
         states = super().begin(ids, paths, bottles)
         self.tape.slots = self.slots

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from pathlib import Path as File
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from dextron_bench.experts import blocks, branching, montecarlo, outcomes
 from dextron_bench.experts.montecarlo import Search
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.reaches.recorded import cache
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.reaches.sources import open_source
@@ -33,7 +33,7 @@ class TimedSource:
     def __init__(self, source: Source) -> None:
         self._source, self.seconds = source, 0.0
 
-    def path(self, setting: Setting) -> Path:
+    def path(self, setting: Setting) -> Trajectory:
         """The path of the source."""
         start = time.perf_counter()
         path = self._source.path(setting)
@@ -84,7 +84,7 @@ def search_rows(draws: int, kept: int, seconds: float, reference_seconds: float)
 
 
 def test_open_recorded_reaches(
-    benchmark: BenchmarkFixture, release: File, tmp_path: File, monkeypatch: pytest.MonkeyPatch
+    benchmark: BenchmarkFixture, release: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path))
     cache.import_release(release)

@@ -10,7 +10,7 @@ import numpy as np
 from dextron_bench.experts import montecarlo
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches import setting as reaches_setting
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.reaches.setting import Setting, Source
 from dextron_bench.reaches.sources import open_source
@@ -41,7 +41,7 @@ class PreparedSource:
         self._paths = {case.setting: self._source.path(case.setting) for case in cases}
         self.name, self.names = self._source.name, self._source.names
 
-    def path(self, setting: Setting) -> Path:
+    def path(self, setting: Setting) -> Trajectory:
         """The prepared path of a setting."""
         return self._paths[setting]
 

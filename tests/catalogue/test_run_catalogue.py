@@ -10,7 +10,7 @@ import pytest
 
 from dextron_bench.catalogue import run_catalogue, run_search
 from dextron_bench.catalogue.expressions import BadExpression
-from dextron_bench.catalogue.run_catalogue import Entry
+from dextron_bench.catalogue.run_catalogue import CataloguedRun
 from dextron_bench.catalogue.run_search import RunFilter
 from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.runs import annotations
@@ -49,7 +49,7 @@ def ended(run: Path, moment: str) -> None:
     (run / "times.json").write_text(json.dumps({"began": "2026-01-01T00:00:00+00:00", "ended": moment}))
 
 
-def names(entries: list[Entry]) -> list[str]:
+def names(entries: list[CataloguedRun]) -> list[str]:
     return [entry.label for entry in entries]
 
 

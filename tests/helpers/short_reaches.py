@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from dextron_bench.reaches.minjerk import ORIENTATION
-from dextron_bench.reaches.reach import Path, Reach
+from dextron_bench.reaches.reach import Reach, Trajectory
 from dextron_bench.reaches.setting import ReachSource, Setting
 from dextron_bench.world.engine import Engine
 
@@ -49,7 +49,7 @@ class TornSource(ReachSource):
     def __init__(self) -> None:
         super().__init__("torn", [SOURCE.reach(name) for name in SOURCE.names])
 
-    def path(self, setting: Setting) -> Path:
+    def path(self, setting: Setting) -> Trajectory:
         """The path of SOURCE, which is broken for TORN."""
         path = super().path(setting)
         if setting == TORN:

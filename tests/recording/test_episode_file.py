@@ -28,7 +28,7 @@ PROPERTIES: dict[str, recording.Value] = {
     "big": 2**62,
 }
 SETTING = Setting("05_fr_05", 0.01, -0.02, 1 / 3)
-PATH = reach.Path(np.zeros((5, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)))
+PATH = reach.Trajectory(np.zeros((5, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)))
 
 
 def episode(steps: int, seed: int = 0, **ends: Any) -> Episode:

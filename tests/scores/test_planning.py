@@ -30,7 +30,7 @@ def test_one_seed_each_needs_the_settings_of_the_textbook():
     """A standard deviation of 10 and a difference of 1: (2.8 * 10)^2 = 785 settings, and two more for Student's t."""
     [plan] = planning.plans(Noise(100.0, (), ()), 1.0, [3, 5])
     assert plan.settings
-    assert plan == planning.Plan(1, plan.settings, 2 * plan.settings)
+    assert plan == planning.SampleSize(1, plan.settings, 2 * plan.settings)
     assert plan.settings == pytest.approx(787, abs=2)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.splits import hard
 from dextron_bench.splits.near_equal import SETTING, without_near_equal
 from dextron_bench.splits.scanning import Scanner
@@ -103,5 +103,5 @@ def test_the_best_distance_has_most_successes(monkeypatch, scanner):
 
 def test_the_rule_closes_at_its_distance_whatever_the_reach():
     """The palm's centre is 0.105 m ahead of the carrier: 0.4 - 0.105 = 0.295 m from the bottle's axis."""
-    path = Path(np.array([[0.0, -0.4, 0.1]]), np.array([[1.0, 0.0, 0.0, 0.0]]))
+    path = Trajectory(np.array([[0.0, -0.4, 0.1]]), np.array([[1.0, 0.0, 0.0, 0.0]]))
     assert hard.first_distance(path) == pytest.approx(0.295)

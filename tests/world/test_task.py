@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dextron_bench.reaches.reach import Path
+from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.world import model, task
 from dextron_bench.world.engine import Engine
 
@@ -27,7 +27,7 @@ def trajectory(bottle: list[float], hand: list[float] | None = None) -> np.ndarr
 
 def play(trajectory: np.ndarray, poses: int = 10_000) -> tuple[list[float], int, bool, bool]:
     """Rewards until the end, the step of the end (0 if there is none), and whether it terminated or truncated."""
-    progress, ids = task.Progress.empty(1), np.array([0])
+    progress, ids = task.EpisodeState.empty(1), np.array([0])
     progress.begin(ids, states(), np.array([poses]))
     rewards = []
     for k, state in enumerate(trajectory, start=1):
@@ -82,7 +82,7 @@ def test_commands_hold_the_thumbs_base_and_scale_the_thumbs_speed_by_its_range()
 
 def test_a_positive_action_closes_every_digit_and_a_negative_one_opens_it():
     """After 0.4 s, the closing digits are closed further by 0.1 than digits at rest, and the opening ones less far."""
-    far = Path(np.tile([0.0, -0.6, 0.3], (30, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (30, 1)))
+    far = Trajectory(np.tile([0.0, -0.6, 0.3], (30, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (30, 1)))
     engine, slots = Engine(3, threads=1), np.arange(3)
     joints, closed = model.proximal()
     engine.begin(slots, [far] * 3)
@@ -140,7 +140,7 @@ def test_no_episode_is_longer_than_ten_seconds(poses: int):
 
 
 def test_the_progress_of_episodes_is_independent():
-    progress, ids = task.Progress.empty(3), np.array([2, 0])
+    progress, ids = task.EpisodeState.empty(3), np.array([2, 0])
     progress.begin(ids, states(2), np.array([5, 50]))
     rows = trajectory([0.25, 0.125])[:, 0]
     progress.advance(ids, rows)

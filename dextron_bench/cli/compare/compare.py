@@ -83,8 +83,13 @@ def as_dict(comparison: Comparison) -> dict[str, Any]:
     """A comparison as values for JSON."""
     a, b = comparison.a, comparison.b
     return {
-        **{"a": a.name, "b": b.name, "reaches": a.reaches, "split": a.split, "digest": a.digest},
-        **{"seeds": [len(a.scores), len(b.scores)], "rows": a.scores.shape[1]},
+        "a": a.name,
+        "b": b.name,
+        "reaches": a.reaches,
+        "split": a.split,
+        "digest": a.digest,
+        "seeds": [len(a.scores), len(b.scores)],
+        "rows": a.scores.shape[1],
         "return": asdict(comparison.score),
         "success": asdict(comparison.success),
         "p_value": comparison.p_value,

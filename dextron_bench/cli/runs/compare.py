@@ -14,7 +14,7 @@ from dextron_bench.cli.support.run_cells import INTERVALS, code_of, interval_tex
 from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
-    from dextron_bench.catalogue.run_catalogue import Entry
+    from dextron_bench.catalogue.run_catalogue import CataloguedRun
 
 
 @dataclass(frozen=True)
@@ -55,11 +55,11 @@ class Compare:
         return DONE
 
 
-def _setting(entry: Entry, name: str) -> Any:
+def _setting(entry: CataloguedRun, name: str) -> Any:
     return {"code": code_of(entry), "physics": entry.physics, **entry.settings}.get(name)
 
 
-def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+def _scores(entries: Sequence[CataloguedRun]) -> list[dict[str, Any]]:
     """Two rows for each split, with each run's mean return and its success rate [%], and their intervals."""
     splits = dict.fromkeys(split for entry in entries for split in entry.scores)
     return [
@@ -69,7 +69,7 @@ def _scores(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     ]
 
 
-def _draw(entries: Sequence[Entry], file: Path) -> None:
+def _draw(entries: Sequence[CataloguedRun], file: Path) -> None:
     import pandas as pd
 
     from dextron_bench.scores.figures.training import learning_curves

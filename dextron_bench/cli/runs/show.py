@@ -11,7 +11,7 @@ from dextron_bench.cli.support.output import print_json, print_table
 from dextron_bench.cli.support.run_cells import INTERVALS, cell, code_of, interval_text, plain
 
 if TYPE_CHECKING:
-    from dextron_bench.catalogue.run_catalogue import Entry
+    from dextron_bench.catalogue.run_catalogue import CataloguedRun
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Show:
         return DONE
 
 
-def _command(entry: Entry) -> str:
+def _command(entry: CataloguedRun) -> str:
     """The command that makes a run again, as far as its config says."""
     from dextron_bench.methods import registry
 

@@ -19,7 +19,7 @@ ALL, METHOD = "--all", "--method"
 
 
 @dataclass(frozen=True)
-class Length:
+class TrainingLength:
     """The setting that all methods with training share."""
 
     preset: Literal["paper", "quick", "tenth", "smoke"] = "paper"
@@ -37,7 +37,7 @@ def with_method_settings(names: Sequence[str], words: Sequence[str], command: An
     elif name not in COMMANDS:
         return command
     if ALL in words and name == "run":
-        return _with_settings(command, Length)
+        return _with_settings(command, TrainingLength)
     if not spec:
         return command
     from dextron_bench.methods import registry

@@ -116,9 +116,15 @@ def progress_bar(title: str, quiet: bool = False) -> Iterator[Progress]:
     from rich.console import Console
 
     columns = (
-        *(rich.TextColumn("{task.description}"), rich.BarColumn(), rich.MofNCompleteColumn()),
-        *(rich.TextColumn("{task.fields[rate]}"), rich.TimeElapsedColumn(), rich.TextColumn("elapsed,")),
-        *(rich.TimeRemainingColumn(), rich.TextColumn("left"), rich.TextColumn("{task.fields[note]}")),
+        rich.TextColumn("{task.description}"),
+        rich.BarColumn(),
+        rich.MofNCompleteColumn(),
+        rich.TextColumn("{task.fields[rate]}"),
+        rich.TimeElapsedColumn(),
+        rich.TextColumn("elapsed,"),
+        rich.TimeRemainingColumn(),
+        rich.TextColumn("left"),
+        rich.TextColumn("{task.fields[note]}"),
     )
     with rich.Progress(*columns, console=Console(stderr=True), speed_estimate_period=RATE_PERIOD) as bars:
         task = bars.add_task(title, total=None, rate="", note="")

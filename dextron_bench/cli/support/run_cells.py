@@ -8,20 +8,27 @@ from typing import TYPE_CHECKING, Any
 from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
-    from dextron_bench.catalogue.run_catalogue import Entry
+    from dextron_bench.catalogue.run_catalogue import CataloguedRun
 
 
 INTERVALS = ("return", "success %")  # The scores that are shown with an interval.
 SETTINGS = "settings."  # Begins the name of a column with a setting.
 
 
-def cell(entry: Entry, name: str, split: str) -> Any:
+def cell(entry: CataloguedRun, name: str, split: str) -> Any:
     """The value of a column, as JSON has it; raises BadInput."""
     values = {
-        **{"run": entry.name, "state": entry.state, "seeds": len(entry.seeds), "note": entry.note},
-        **{"val": _none_for_nan(entry.score("val")), "return": _none_for_nan(entry.score(split))},
+        "run": entry.name,
+        "state": entry.state,
+        "seeds": len(entry.seeds),
+        "note": entry.note,
+        "val": _none_for_nan(entry.score("val")),
+        "return": _none_for_nan(entry.score(split)),
         "success": _none_for_nan(entry.score(split, "success")),
-        **{"date": _date(entry), "splits": list(entry.scores), "tags": list(entry.tags), "physics": entry.physics[:8]},
+        "date": _date(entry),
+        "splits": list(entry.scores),
+        "tags": list(entry.tags),
+        "physics": entry.physics[:8],
     }
     if name.startswith(SETTINGS):
         return entry.settings.get(name.removeprefix(SETTINGS))
@@ -34,12 +41,12 @@ def _none_for_nan(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def _date(entry: Entry) -> str | None:
+def _date(entry: CataloguedRun) -> str | None:
     """When a run last ended or began; None if its files do not say."""
     return entry.changed.strftime("%Y-%m-%d %H:%M") if entry.changed else None
 
 
-def interval_text(entry: Entry, split: str, what: str) -> str | None:
+def interval_text(entry: CataloguedRun, split: str, what: str) -> str | None:
     """A run's mean score on a split with its 95 % interval, `what` being one of INTERVALS; None if it has no score."""
     from dextron_bench.scores import statistics
     from dextron_bench.world import task
@@ -53,7 +60,7 @@ def interval_text(entry: Entry, split: str, what: str) -> str | None:
     return f"{100 * share.mean:.1f} [{100 * share.low:.1f}, {100 * share.high:.1f}]"
 
 
-def code_of(entry: Entry) -> str:
+def code_of(entry: CataloguedRun) -> str:
     """The class of a run's method, and the first digits of the hash of its file if it is in a file."""
     return f"{entry.code.name} {(entry.code.sha256 or '')[:8]}".rstrip() if entry.code else ""
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from dextron_bench.errors import BadInput
 
 if TYPE_CHECKING:
-    from dextron_bench.catalogue.run_catalogue import Entry
+    from dextron_bench.catalogue.run_catalogue import CataloguedRun
 
 
 def remove_if_empty(folder: Path, runs: Path) -> None:
@@ -36,7 +36,7 @@ def folders(runs: Path, names: Iterable[str]) -> list[Path]:
     return sorted(set(places.values()))
 
 
-def find(runs: Path, name: str) -> Entry:
+def find(runs: Path, name: str) -> CataloguedRun:
     """A run in the folder of all runs; raises NotFound."""
     from dextron_bench.catalogue import run_catalogue
 

@@ -39,8 +39,12 @@ def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
         is_fresh = "fresh" in group and bool(group["fresh"].notna().any())
         lines = [
             [
-                *(cells.rank(row), row["method"], cells.mean_return(row), cells.success(row)),
-                *(cells.interquartile_mean(row), cells.regret(row)),
+                cells.rank(row),
+                row["method"],
+                cells.mean_return(row),
+                cells.success(row),
+                cells.interquartile_mean(row),
+                cells.regret(row),
                 *([cells.fresh(row), cells.gap(row), cells.mark(row)] if is_fresh else []),
                 *(row[name] for name in counts),
             ]

@@ -83,7 +83,8 @@ class CrossValidate:
             print_json(
                 [
                     {
-                        **{"subject": subject, "settings": count},
+                        "subject": subject,
+                        "settings": count,
                         "methods": {
                             label: {"return": asdict(returns), "success": asdict(successes)}
                             for label, (returns, successes) in zip(table, estimates, strict=True)

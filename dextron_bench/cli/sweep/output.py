@@ -26,7 +26,10 @@ def print_trials(file: SweepFile, content: SweepContent, trials: list[Trial], ru
     rows = [
         [
             *(str(trial.settings[name]) for name in names),
-            *(trial.run, _interval(trial), _percent(trial), _running(trial, runs) or _state(trial)),
+            trial.run,
+            _interval(trial),
+            _percent(trial),
+            _running(trial, runs) or _state(trial),
         ]
         for trial in ranked
     ]

@@ -14,7 +14,7 @@ import pandas as pd
 from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard import highlights
 from dextron_bench.leaderboard.page import sections, standings_table
-from dextron_bench.leaderboard.page.rows import Entry, entries
+from dextron_bench.leaderboard.page.rows import PageRow, entries
 from dextron_bench.leaderboard.page.sections import Curves
 from dextron_bench.leaderboard.page.standings_table import Code
 from dextron_bench.splits.loading import SPLIT_NAMES
@@ -71,7 +71,7 @@ def document(rows: pd.DataFrame, results: Iterable[Result], curves: Curves, reco
     return Template(_resource("page.html")).substitute(values)
 
 
-def _controls(table_entries: Sequence[Entry]) -> Html:
+def _controls(table_entries: Sequence[PageRow]) -> Html:
     """The controls that filter the table by source, split and tier."""
     splits = {entry.split for entry in table_entries}
     choices = {

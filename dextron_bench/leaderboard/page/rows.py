@@ -18,7 +18,7 @@ QUOTED = "quoted"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
+class PageRow:
     """A row of the table: `scores` has the leaderboard's columns; other fields are None if they are unknown.
 
     `role` names ceilings and floors, `frames` counts the training frames, `seconds` is the time of training,
@@ -42,7 +42,7 @@ class Entry:
 
 
 # Numbers in the paper's text (sections Simulations, Results, Discussion); none is read off a figure.
-PAPER = Entry(
+PAPER = PageRow(
     method="RLIL 0.1",
     reaches="real",
     split="test",
@@ -55,7 +55,7 @@ PAPER = Entry(
 )
 
 
-def entries(rows: pd.DataFrame, results: Iterable[Result]) -> list[Entry]:
+def entries(rows: pd.DataFrame, results: Iterable[Result]) -> list[PageRow]:
     """An entry for each of the leaderboard's rows, in their order; the paper's entry follows the rows of its split."""
     seeds: dict[tuple[str, str], list[Result]] = defaultdict(list)
     for result in results:
@@ -80,9 +80,9 @@ def role(method: str) -> str | None:
     return "floor" if method in registry.FLOORS else None
 
 
-def _entry(row: dict[Any, Any], results: Sequence[Result]) -> Entry:
+def _entry(row: dict[Any, Any], results: Sequence[Result]) -> PageRow:
     trainings = [result.training or _declared_training(result) for result in results]
-    return Entry(
+    return PageRow(
         method=row["method"],
         reaches=row["reaches"],
         split=row["split"],

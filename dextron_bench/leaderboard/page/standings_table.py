@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 from dextron_bench.leaderboard.highlights import Shown
-from dextron_bench.leaderboard.page.rows import QUOTED, Entry
+from dextron_bench.leaderboard.page.rows import QUOTED, PageRow
 from dextron_bench.scores import cells
 from dextron_bench.web import svg
 from dextron_bench.web.html import UNKNOWN, Html, join, tag
@@ -23,13 +23,13 @@ class Column:
     """A column: its heading, the value of an entry to sort by (None comes last), and the content of its cell."""
 
     title: str
-    value: Callable[[Entry], Any]
-    show: Callable[[Entry], str | Html]
+    value: Callable[[PageRow], Any]
+    show: Callable[[PageRow], str | Html]
     number: bool = False
     hint: str | None = None
 
 
-def table(entries: Sequence[Entry], links: Links, code: Code) -> Html:
+def table(entries: Sequence[PageRow], links: Links, code: Code) -> Html:
     """The whole table in the order of the entries; readable without a script."""
     known = {name for entry in entries for name, value in entry.scores.items() if value == value}
     columns = _columns(known | ({"code"} if code else set()), links, code)
@@ -71,7 +71,7 @@ def _heading(column: Column) -> Html:
     return tag("th", button, hint, scope="col", aria_sort="none", class_=kind, data_name=column.title)
 
 
-def _row(entry: Entry, columns: Sequence[Column]) -> Html:
+def _row(entry: PageRow, columns: Sequence[Column]) -> Html:
     row = []
     for column in columns:
         value = column.value(entry)
@@ -88,33 +88,33 @@ def _row(entry: Entry, columns: Sequence[Column]) -> Html:
     return tag("tr", *row, data_reaches=entry.reaches, data_split=entry.split, data_tier=entry.tier, class_=kind)
 
 
-def _score(name: str) -> Callable[[Entry], Any]:
+def _score(name: str) -> Callable[[PageRow], Any]:
     return lambda entry: entry.scores.get(name)
 
 
-def _method(entry: Entry) -> Html:
+def _method(entry: PageRow) -> Html:
     mark = "quoted" if entry.tier == QUOTED else entry.role
     note = tag("small", entry.note) if entry.note else None
     marks = [tag("span", text, class_="mark") for text in (mark, cells.mark(entry.scores)) if text]
     return join(tag("span", entry.method, class_="name"), *marks, note)
 
 
-def _tier(entry: Entry) -> Html:
+def _tier(entry: PageRow) -> Html:
     return join(tag("span", entry.tier, class_="tier"), tag("small", entry.equal) if entry.equal else None)
 
 
-def _split(entry: Entry) -> str:
+def _split(entry: PageRow) -> str:
     return "the paper's own" if entry.tier == QUOTED else entry.split
 
 
-def _return(entry: Entry) -> Html:
+def _return(entry: PageRow) -> Html:
     """The mean return with its interval, as text and as a drawing."""
     value, low, high = (entry.scores.get(f"return{end}") for end in ("", "_low", "_high"))
     text = tag("span", _with_interval(cells.mean_return(entry.scores)), class_="figure")
     return join(text, svg.estimate(value or 0.0, low, high, 20.0))
 
 
-def _success(entry: Entry) -> Html:
+def _success(entry: PageRow) -> Html:
     return _with_interval(cells.success(entry.scores))
 
 
@@ -122,7 +122,7 @@ def _with_interval(score: cells.Score) -> Html:
     return join(tag("b", score.value), " ", tag("span", score.interval, class_="range") if score.interval else None)
 
 
-def _fresh(entry: Entry) -> str | Html:
+def _fresh(entry: PageRow) -> str | Html:
     """The mean return on fresh settings, and how much higher the return on the split is."""
     score = cells.fresh(entry.scores)
     if not score.value:
@@ -130,7 +130,7 @@ def _fresh(entry: Entry) -> str | Html:
     return join(_with_interval(score), tag("small", f"gap {cells.gap(entry.scores)}"))
 
 
-def _interquartile_mean(entry: Entry) -> str:
+def _interquartile_mean(entry: PageRow) -> str:
     return cells.interquartile_mean(entry.scores).value or UNKNOWN
 
 
@@ -138,7 +138,7 @@ def _count(value: int | None) -> str:
     return UNKNOWN if value is None else f"{value:,}"
 
 
-def _wall_time(entry: Entry) -> Html:
+def _wall_time(entry: PageRow) -> Html:
     """The time and the hardware of training."""
     text = UNKNOWN
     if entry.seconds is not None:
@@ -147,11 +147,11 @@ def _wall_time(entry: Entry) -> Html:
     return join(text, tag("small", entry.hardware) if entry.hardware else None)
 
 
-def _privileged(entry: Entry) -> str:
+def _privileged(entry: PageRow) -> str:
     return entry.privileged or UNKNOWN
 
 
-def _links(entry: Entry, links: Links) -> str | Html:
+def _links(entry: PageRow, links: Links) -> str | Html:
     """Links to the method's recordings; names their source of reaches if the row has another one."""
     shown = links.get(entry.method, ()) if entry.tier != QUOTED else ()
     if not shown:
@@ -161,12 +161,12 @@ def _links(entry: Entry, links: Links) -> str | Html:
     return join(*(tag("a", recording.kind, href=recording.address) for recording in shown), note)
 
 
-def _files(entry: Entry, code: Code) -> Sequence[str]:
+def _files(entry: PageRow, code: Code) -> Sequence[str]:
     """The paths from the page to the files of a submission's agent."""
     return code.get((entry.method, entry.reaches), ()) if entry.tier != QUOTED else ()
 
 
-def _code(entry: Entry, code: Code) -> str | Html:
+def _code(entry: PageRow, code: Code) -> str | Html:
     """Links to the files of a submission's agent."""
     files = _files(entry, code)
     return join(*(tag("a", file.rpartition("/")[2], href=quote(file)) for file in files)) if files else UNKNOWN

@@ -18,15 +18,26 @@ from dextron_bench.errors import DextronError
 from dextron_bench.methods.isolation import sandbox
 
 PUBLIC = {  # Modules of the benchmark that agents may import, and the modules that these import (docs/agents.md).
-    *("dextron_bench", "dextron_bench.errors", "dextron_bench.experts", "dextron_bench.experts.policies"),
-    *("dextron_bench.methods", *(f"dextron_bench.methods.{name}" for name in ("agents", "exact", "learners"))),
-    *("dextron_bench.reaches", *(f"dextron_bench.reaches.{name}" for name in ("reach", "rotation", "timing"))),
-    *("dextron_bench.storage", *(f"dextron_bench.storage.{name}" for name in ("atomic", "hashing", "tensors"))),
-    *("dextron_bench.success", "dextron_bench.success.network"),
-    *("dextron_bench.world", "dextron_bench.world.model", "dextron_bench.world.task"),
+    "dextron_bench",
+    "dextron_bench.errors",
+    "dextron_bench.experts",
+    "dextron_bench.experts.policies",
+    "dextron_bench.methods",
+    *(f"dextron_bench.methods.{name}" for name in ("agents", "exact", "learners")),
+    "dextron_bench.reaches",
+    *(f"dextron_bench.reaches.{name}" for name in ("reach", "rotation", "timing")),
+    "dextron_bench.storage",
+    *(f"dextron_bench.storage.{name}" for name in ("atomic", "hashing", "tensors")),
+    "dextron_bench.success",
+    "dextron_bench.success.network",
+    "dextron_bench.world",
+    "dextron_bench.world.model",
+    "dextron_bench.world.task",
 }
 WORKER = (
-    *("dextron_bench.methods.isolation", "dextron_bench.methods.loading", "dextron_bench.methods.specs"),
+    "dextron_bench.methods.isolation",
+    "dextron_bench.methods.loading",
+    "dextron_bench.methods.specs",
     "dextron_bench.processes.programs",
 )
 WORKER_FILES = ("worker", "guard", "policy_files", "protocol", "sandbox")  # In WORKER's first package.
@@ -36,8 +47,20 @@ PROCESSES = ("subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn"
 INTROSPECTION = ("gc.get_", "sys._current_frames", "resource.")
 LISTING = ("os.listdir", "os.scandir")
 CHANGING = (  # Arguments: paths, then numbers, then in some events the descriptors of the folders.
-    *("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "os.mkfifo"),
-    *("os.chmod", "os.chown", "os.utime", "os.setxattr", "shutil.rmtree", "shutil.move"),
+    "os.remove",
+    "os.rename",
+    "os.rmdir",
+    "os.mkdir",
+    "os.link",
+    "os.symlink",
+    "os.truncate",
+    "os.mkfifo",
+    "os.chmod",
+    "os.chown",
+    "os.utime",
+    "os.setxattr",
+    "shutil.rmtree",
+    "shutil.move",
 )
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 DEVICES = ("/dev/null", "/dev/urandom", "/dev/random", "/proc/cpuinfo", "/proc/meminfo", "/proc/self", "/sys/devices")

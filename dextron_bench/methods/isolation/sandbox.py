@@ -23,7 +23,13 @@ PYTHON = ("bin", "lib", "lib64", "pyvenv.cfg")
 PROGRAMS = (
     *(f"/usr/{part}" for part in PARTS),
     *(f"/usr/local/{part}" for part in PARTS),
-    *("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/etc/ld.so.cache", "/etc/alternatives"),
+    "/bin",
+    "/sbin",
+    "/lib",
+    "/lib32",
+    "/lib64",
+    "/etc/ld.so.cache",
+    "/etc/alternatives",
 )
 PROGRAM = "bwrap"
 SIMULATORS = ("mujoco", "dm_control")  # Packages that are hidden.

@@ -21,8 +21,12 @@ PLACES = 5  # Decimals of the places of axes, in shares of the figure.
 INK = "#010203"  # The page replaces this colour with the colour of its text.
 INLINE: Any = {  # For pictures inside the page: text stays text, and the background is transparent.
     **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
-    **{"svg.fonttype": "none", "savefig.transparent": True, "legend.frameon": False, "text.parse_math": False},
-    **{"axes.spines.top": False, "axes.spines.right": False},
+    "svg.fonttype": "none",
+    "savefig.transparent": True,
+    "legend.frameon": False,
+    "text.parse_math": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
 }
 rcdefaults()  # A file `matplotlibrc` in the working folder, or of the user, changes no picture.
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import pandas as pd
 
-from dextron_bench.leaderboard.page.rows import Entry, entries
+from dextron_bench.leaderboard.page.rows import PageRow, entries
 from tests.helpers.results import result
 
 ROW = pd.DataFrame([{"method": "mine", "reaches": "synthetic", "split": "test", "return": 5.0}])
 
 
-def entry(seconds: float | None = None, **properties: Any) -> Entry:
+def entry(seconds: float | None = None, **properties: Any) -> PageRow:
     """The entry of a result with these properties, evaluated on a known machine."""
     provenance = {"machine": {"cpu": "the evaluating machine", "cores": 2}, "seconds": seconds}
     (row,) = entries(ROW, [result("mine", 0, "synthetic", provenance=provenance, **properties)])
