@@ -110,9 +110,8 @@ def build(
     tried = summary["search"]["experts"]
     distance = hard.best_distance(scanner, parts["val"])
     held_out = pd.concat([part for name, part in parts.items() if name != "train"])
-    parts["hard"] = hard.draw(
-        scanner, parts["train"], held_out, distance, seed, sizes.evaluated, sizes.coarse, sizes.scan
-    )
+    settings = hard.HardSettings(scanner, parts["train"], held_out, distance, sizes.coarse, sizes.scan)
+    parts["hard"] = settings.draw(sizes.evaluated, seed)
     parts["open"] = draw_open(source, parts.values(), seed, sizes)
     solved = parts["train"].groupby(SETTING)["score"].transform("size").to_numpy()
     windows = RANGE * solved / tried

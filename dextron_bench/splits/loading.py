@@ -23,6 +23,7 @@ from dextron_bench.storage import hashing
 from dextron_bench.world import bottle
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
+VAL = "val"  # The split on which everything is chosen.
 SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "hard", "open")
 EVALUATED = ("test", "unseen-reach", "unseen-subject", "hard")
 

@@ -80,7 +80,7 @@ def _played(
 
 def _equal(computed: Any, claimed: Any) -> bool:
     """True if two values are equal; NaN equals NaN."""
-    return bool(computed == claimed or (computed != computed and claimed != claimed))
+    return bool(computed == claimed or (pd.isna(computed) and pd.isna(claimed)))
 
 
 def _alike(computed: dict[str, Any], claimed: dict[str, Any]) -> bool:

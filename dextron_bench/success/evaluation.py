@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -34,7 +35,7 @@ class Evaluation:
     def as_dict(self) -> dict[str, Any]:
         """All values by name, for JSON: None replaces NaN."""
         means, shares, counts = (_without_nan(values) for values in self.calibration)
-        overall = {name: None if value != value else value for name, value in asdict(self.overall).items()}
+        overall = {name: None if math.isnan(value) else value for name, value in asdict(self.overall).items()}
         curves = {"auc_by_time": _without_nan(self.auc_by_time), "predicted": means, "observed": shares}
         return overall | curves | {"predictions": counts}
 
@@ -60,7 +61,7 @@ def evaluate(
 
 
 def _without_nan(values: np.ndarray) -> list[float | None]:
-    return [None if value != value else value for value in values.tolist()]
+    return [None if math.isnan(value) else value for value in values.tolist()]
 
 
 def _play(source: Source, rows: Rows, agent: Agent | None, threads: int) -> Iterator[Episode]:
