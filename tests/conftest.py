@@ -15,7 +15,7 @@ from dextron_bench.cli.support import output
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
-from tests.helpers import abilities, forged_bundles, tiny_benchmark, tiny_training
+from tests.helpers import abilities, forged_bundles, forked_readers, tiny_benchmark, tiny_training
 from tests.helpers.browser import open_browser
 from tests.helpers.small_release import SmallRelease, make_small_release
 
@@ -57,6 +57,13 @@ def no_old_progress() -> None:
     so put those back.
     """
     output._Lines.printed = None
+
+
+@pytest.fixture(scope="session", autouse=os.name == "posix")
+def quick_readers() -> Iterator[None]:
+    """Files of strangers are read by copies of one process, which saves some hundred starts of Python."""
+    with forked_readers.installed():
+        yield
 
 
 @pytest.fixture(scope="session")

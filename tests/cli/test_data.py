@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -29,13 +31,20 @@ sys.exit(main())
 
 
 def run(small_release: SmallRelease, *arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs the command line in a separate process, by default with an empty cache."""
-    inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
-    cache = {"DEXTRON_CACHE": str(small_release.folder / "cache")}
-    command = [sys.executable, "-c", INJECT, str(small_release.manifest), *map(str, arguments)]
-    return subprocess.run(
-        command, env={**inherited, **cache, **environment}, capture_output=True, text=True, timeout=120
-    )
+    """Runs the command line, by default with an empty cache."""
+    words, streams = list(map(str, arguments)), (io.StringIO(), io.StringIO())
+    manifest = release.Manifest.load(small_release.manifest)
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(streams[0]), redirect_stderr(streams[1]):
+        for name in [name for name in os.environ if name.startswith("DEXTRON_")]:
+            patch.delenv(name)
+        for name, value in {"DEXTRON_CACHE": str(small_release.folder / "cache"), **environment}.items():
+            patch.setenv(name, value)
+        patch.setattr(release.Manifest, "load", lambda: manifest)
+        try:
+            code = main.main(words)
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+    return subprocess.CompletedProcess(words, code, *(stream.getvalue() for stream in streams))
 
 
 def complaint(done: subprocess.CompletedProcess[str]) -> str:
