@@ -54,6 +54,7 @@ def read(tmp_path: Path, needs_mlflow: None) -> dict[str, Any]:
     return runs
 
 
+@pytest.mark.slow
 def test_mlflow_reads_settings_scores_curves_and_tags(read: dict[str, Any]):
     done = read[DONE.name].data
     assert done.params == DONE.params

@@ -52,6 +52,7 @@ def change(folder: Path, **values: Any) -> None:
     run_files.store_episodes(RunFolder(folder), table.assign(**values))
 
 
+@pytest.mark.slow
 def test_recordings_made_afterwards_equal_those_of_the_run(tmp_path: Path):
     during, later = play(tmp_path / "during", record=2), play(tmp_path / "later")
     assert not (later / "recordings").exists()
@@ -99,6 +100,7 @@ def test_the_reason_of_a_failed_agent_is_kept(tmp_path: Path):
     assert (summary.properties["method"], summary.properties["seed"]) == ("late", 2)
 
 
+@pytest.mark.slow
 def test_without_actions_only_existing_recordings_are_available(tmp_path: Path):
     folder = play(tmp_path, record=1)
     table = pd.read_parquet(folder / "episodes.parquet")
@@ -116,6 +118,7 @@ def test_without_actions_only_existing_recordings_are_available(tmp_path: Path):
     assert len(rerecorded(play(tmp_path))) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("column", "value"), [("score", 19.0), ("length", 3), ("duration_noise", 2.0)])
 def test_an_episode_that_differs_when_replayed_is_not_recorded(tmp_path: Path, column: str, value: float):
     folder = play(tmp_path)

@@ -109,6 +109,7 @@ def test_runs_are_archived_and_removed_only_when_that_is_confirmed(
     assert {row["run"] for row in json.loads(runs("list", "--json"))} == {"broken/synthetic", "mine-near0.2/synthetic"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "line"),
     [

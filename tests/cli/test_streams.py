@@ -58,6 +58,7 @@ def start(*words: str, code: str = TABLES, shell: str = "", **environment: str) 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [METHODS, ["--help"], ["run", "--help"], ["--version"], [*METHODS, "--json"]])
 def test_a_reader_that_leaves_is_no_error(words: list[str]):
     """Rich ends the process with code 1 if it is the first to notice, and Python at its end with code 120."""
@@ -120,6 +121,7 @@ def test_the_size_and_kind_of_a_terminal_change_no_exit_code(more: dict[str, str
         assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.slow
 def test_json_stands_alone_on_stdout_though_the_agent_prints(tiny_world: Path):
     (tiny_world / "mine.py").write_text(LOUD)
     words = ["run", "--method", "mine.py:Mine", "--split", "test", "--quiet", "--record", "0", "--json"]

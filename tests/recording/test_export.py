@@ -56,6 +56,7 @@ def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, su
     assert os.listdir(file.parent) == [file.name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_the_suffix_decides_the_format_of_a_film(recorded: Path, tmp_path: Path, suffix: str):
     progress, file = [], tmp_path / f"film{suffix}"

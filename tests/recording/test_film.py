@@ -59,6 +59,7 @@ def test_a_film_shows_these_steps_at_this_rate(count: int, rate: float, speed: f
     assert recording_film.shown_steps(count, rate, speed) == (shown, pytest.approx(fps))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("write", "count"), [(recording_film.mp4, 26), (recording_film.gif, 14)])
 def test_a_film_takes_as_long_as_the_episode_and_shows_it(tmp_path: Path, write: Callable[..., None], count: int):
     file, progress = tmp_path / f"film.{write.__name__}", []

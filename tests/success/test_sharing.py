@@ -27,6 +27,7 @@ def generate_share(folder: Path, text: str) -> int:
     return int(work_in(folder).play_share(shares.Share.parse(text)).removesuffix(" blocks"))
 
 
+@pytest.mark.slow
 def test_shares_in_any_order_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     tallies = generate_small(tmp_path / "whole", ROWS)
     merged = tmp_path / "merged"
@@ -48,6 +49,7 @@ def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
         work_in(tmp_path).check_complete()
 
 
+@pytest.mark.slow
 def test_a_piece_of_another_data_set_is_refused(tmp_path: Path):
     generate_share(tmp_path / "a", "0/1")
     other = generation.DatasetConfig("synthetic", seed=1, block=5, policies=("nothing",))

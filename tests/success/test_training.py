@@ -26,6 +26,7 @@ def trained(tmp_path: Path) -> Path:
     return tmp_path / "trained"
 
 
+@pytest.mark.slow
 def test_a_stopped_training_ends_with_the_same_bytes(trained: Path, tmp_path: Path):
     write_block(tmp_path / "stopped", 0, [30] * 10, [0, 1] * 5)
 
