@@ -14,7 +14,7 @@ import numpy as np
 from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.results import Code, Result, RunConfig
 from dextron_bench.runs import annotations, playing, result_files
-from dextron_bench.splits.loading import VAL
+from dextron_bench.splits.names import VAL
 from dextron_bench.storage import records, run_times
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.storage.run_times import RunTimes

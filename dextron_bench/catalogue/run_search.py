@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from dextron_bench.errors import BadInput
-from dextron_bench.splits.loading import VAL
+from dextron_bench.splits.names import VAL
 
 if TYPE_CHECKING:
     import pandas as pd

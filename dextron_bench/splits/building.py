@@ -15,7 +15,8 @@ from dextron_bench.errors import BadInput
 from dextron_bench.experts import policies
 from dextron_bench.reaches import setting
 from dextron_bench.splits import hard
-from dextron_bench.splits.loading import EVALUATED, SPLIT_NAMES, split_digest
+from dextron_bench.splits.loading import split_digest
+from dextron_bench.splits.names import EVALUATED, SPLIT_NAMES
 from dextron_bench.splits.near_equal import SETTING, without_near_equal
 from dextron_bench.splits.scanning import RANGE, Scanner, best_critical, success_window
 from dextron_bench.storage import atomic

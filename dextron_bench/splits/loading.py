@@ -17,15 +17,13 @@ from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches import setting
 from dextron_bench.splits import tracks
+from dextron_bench.splits.names import EVALUATED, SPLIT_NAMES
 from dextron_bench.splits.rows import Rows
 from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.storage import hashing
 from dextron_bench.world import bottle
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
-VAL = "val"  # The split on which everything is chosen.
-SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "hard", "open")
-EVALUATED = ("test", "unseen-reach", "unseen-subject", "hard")
 
 
 class UnknownSplit(NotFound):

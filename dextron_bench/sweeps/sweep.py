@@ -13,7 +13,8 @@ import numpy as np
 from dextron_bench.errors import BadInput
 from dextron_bench.methods import registry
 from dextron_bench.runs.plans import Plan, resolve
-from dextron_bench.splits.loading import VAL, load_split
+from dextron_bench.splits.loading import load_split
+from dextron_bench.splits.names import VAL
 from dextron_bench.storage import atomic, folder_config, hashing, records
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.records import Count, Record

@@ -149,6 +149,7 @@ def test_a_method_is_created_for_the_reaches_of_its_run(tmp_path: Path):
         registry.create("omega", {}, "minjerk")
 
 
+@pytest.mark.slow
 def test_from_the_command_line(tiny_world: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
     words = ["run", "--method", "omega", "--split", "test", "--quiet", "--record", "0"]
     assert "no success model ships for minjerk reaches" in complaint(*words, "--reaches", "minjerk")

@@ -126,6 +126,7 @@ def test_the_time_to_contact_by_hand():
     np.testing.assert_allclose(pose_features._time_to_contact(now, past, 3)[:, 0], [0.1, pose_features.LONGEST])
 
 
+@pytest.mark.slow
 def test_features_of_whole_episodes_equal_those_that_an_agent_sees(played: Openings):
     """Two episodes of different lengths in one history; the first row begins again after the shorter one."""
     first, second = (played.states[played.rows(number)].astype(float) for number in (0, 1))

@@ -62,6 +62,7 @@ def test_recordings_made_afterwards_equal_those_of_the_run(tmp_path: Path):
     assert digests(files) == digests(expected)
 
 
+@pytest.mark.slow
 def test_existing_recordings_are_not_made_again(tmp_path: Path):
     folder, reports = play(tmp_path, record=1), []
     before = {file.name: file.read_bytes() for file in (folder / "recordings").iterdir()}
@@ -73,6 +74,7 @@ def test_existing_recordings_are_not_made_again(tmp_path: Path):
     assert {name: (folder / "recordings" / name).read_bytes() for name in before} == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [lambda content: content[:-9], lambda content: b"reach,return\n"])
 def test_a_damaged_recording_is_replaced(tmp_path: Path, damage: Any):
     folder = play(tmp_path, record=2)
@@ -82,6 +84,7 @@ def test_a_damaged_recording_is_replaced(tmp_path: Path, damage: Any):
     assert digests(rerecorded(folder, EpisodeFilter(split=("test",), row=(1,)))) == expected
 
 
+@pytest.mark.slow
 def test_a_recording_of_another_version_of_the_split_is_replaced(tmp_path: Path):
     folder = play(tmp_path, record=1)
     file = folder / "recordings" / "test-0000.rrd"

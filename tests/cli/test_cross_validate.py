@@ -48,6 +48,7 @@ def validate(*words: str, method: str = TOY, beside: Sequence[str] = ("exp",)) -
     return ["sweep", "cross-validate", "--method", method, *preset, "--beside", *beside, "--quiet", *words]
 
 
+@pytest.mark.slow
 def test_a_method_learns_without_each_subject_and_plays_its_settings(
     here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):

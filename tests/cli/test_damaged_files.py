@@ -60,6 +60,7 @@ def first_split(result: dict[str, Any], **values: Any) -> None:
     result["splits"]["test"] |= values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "change", "command"),
     [

@@ -153,6 +153,7 @@ def test_every_command_has_an_example(capsys: pytest.CaptureFixture[str]):
             assert f"Example: dextron-bench {' '.join([name, *inner])}" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_help_imports_nothing_heavy():
     script = "import sys; from dextron_bench.cli import main; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()

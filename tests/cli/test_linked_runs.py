@@ -46,6 +46,7 @@ def test_all_commands_see_the_runs_behind_a_link(
     assert printed(capsys, "view", "--print", "--worst", "2", "--method", "exp", "--quiet") == viewed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES)
 def test_an_archived_run_keeps_its_files_behind_a_link(place: str, two_runs: Path, capsys: pytest.CaptureFixture[str]):
     link(two_runs, place)

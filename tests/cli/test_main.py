@@ -129,6 +129,7 @@ def test_a_process_has_the_same_exit_codes(here: Path):
     assert err.startswith("dextron-bench: no method 'nosuch'; choose from ")
 
 
+@pytest.mark.slow
 def test_help_and_the_package_itself_import_nothing_heavy():
     script = "import sys\ntry:\n from dextron_bench.cli.main import main; main(['--help'])\nexcept SystemExit: pass\n"
     done = subprocess.run(

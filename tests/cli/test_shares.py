@@ -136,6 +136,7 @@ def test_pieces_of_two_machines_give_the_same_scores_and_name_both(here: Path, m
     ).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_merge_of_nothing_or_of_some_pieces_names_what_is_missing(here: Path, complaint: Callable[..., str]):
     text = complaint(*RUN, "--merge")
     assert "the merge lacks 3 of 3 pieces: exp/synthetic/seed0/test-0000-0000, exp/synthetic/seed0/test-0001" in text

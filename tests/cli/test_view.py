@@ -171,6 +171,7 @@ def test_an_impossible_pair_is_one_line(here: Path, complaint: Callable[..., str
     assert "no episode has row 7" in complaint("view", "--diff", "runs/exp", NOTHING, "--row", "7")
 
 
+@pytest.mark.slow
 def test_a_policy_plays_live(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
 ):

@@ -105,6 +105,7 @@ def test_a_piece_of_another_version_of_the_work_is_not_played(here: Path):
         pieces.play_piece(*arguments)
 
 
+@pytest.mark.slow
 def test_a_data_set_has_the_same_bytes(here: Path):
     words = ("success", "data", "--rows", "300", "--quiet")
     play(*words, "--threads", "1", "--runs", "whole")
@@ -114,6 +115,7 @@ def test_a_data_set_has_the_same_bytes(here: Path):
     assert not (here / "runs/success/synthetic/seed0/pieces").exists()
 
 
+@pytest.mark.slow
 def test_a_submission_is_the_same_bundle(here: Path, complaint: Callable[..., str]):
     words = ("submit", constant_agent(here, "0.1", "steady"), "--name", "mine", "--seed", "0", "--quiet")
     words += ("--record", "0", "--timeout", "300")

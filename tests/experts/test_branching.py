@@ -40,6 +40,7 @@ def test_experts_played_together_and_one_by_one_have_equal_outcomes(alone, slots
     np.testing.assert_array_equal([batch.lengths for batch in outcomes], alone[1])
 
 
+@pytest.mark.slow
 def test_outcomes_differ_between_experts(alone):
     # The comparison above needs this: closing at 0.12 grasps the bottle, closing at once does not.
     scores = alone[0]

@@ -50,6 +50,7 @@ def test_an_outcome_is_the_end_of_an_episode_that_closes_there(played: Openings)
     assert set(played.outcomes) == {NO_DECISION, FAILS, SUCCEEDS}
 
 
+@pytest.mark.slow
 def test_decisions_begin_near_the_bottle_and_come_every_second_step(played: Openings):
     for number in range(len(played)):
         rows = played.rows(number)

@@ -80,6 +80,7 @@ def test_handwritten_text_stays_and_a_second_build_changes_nothing(here: Path):
     assert readme.read_text() == before
 
 
+@pytest.mark.slow
 def test_an_unfinished_run_is_not_published(here: Path, complaint: Callable[..., str]):
     for file in (here / "runs").glob("*/*/seed*/result.json"):
         result = json.loads(file.read_text())

@@ -38,6 +38,7 @@ def test_each_method_has_its_shortest_episodes_and_each_kind_its_clearest(runs: 
         assert recording.read(file).episode.score == score
 
 
+@pytest.mark.slow
 def test_exemplars_are_of_any_method_and_outcomes_of_the_methods_that_are_named(runs: Path):
     every, few = (highlights.choose(runs, ["synthetic"], "test", 100, methods) for methods in ((), ("nothing",)))
     assert few["name"].tolist() == [name for name in every["name"] if name != "exp-success"]

@@ -145,6 +145,7 @@ def test_baselines_on_a_board_are_run_again(submitted: Path, tmp_path: Path, cap
     assert "its methods: exp, random" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_invalid_submission_is_refused_with_the_reason(submitted: Path, capsys: pytest.CaptureFixture[str]):
     for words, reason in (
         (["--name", "a/b"], "'a/b' is not a valid name"),

@@ -42,6 +42,7 @@ def test_each_layout_has_its_own_application_id(tmp_path: Path) -> None:
     assert [summary.damage for summary in recording.summarise(files, whole=True)] == ["", "", ""]
 
 
+@pytest.mark.slow
 def test_it_opens_with_its_own_layout(whole: Path) -> None:
     """Without an active blueprint the viewer chooses a layout itself, and a bad one."""
     printed = subprocess.run(

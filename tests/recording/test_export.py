@@ -100,6 +100,7 @@ def test_a_damaged_recording_is_not_exported(recorded: Path, tmp_path: Path):
     assert os.listdir(tmp_path) == ["cut.rrd"]
 
 
+@pytest.mark.slow
 def test_frames_of_a_film_are_close_to_stills():
     states = episode(1).states
     with renderer.Renderer(32, 24, supersampling=2) as frame_renderer:

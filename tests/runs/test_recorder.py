@@ -76,6 +76,7 @@ def test_a_recording_that_cannot_be_written_is_named(tmp_path: Path, two: Record
     assert list(two.hashes()) == [tmp_path / "1.rrd"]  # The process goes on.
 
 
+@pytest.mark.slow
 def test_a_process_that_was_killed_is_named(tmp_path: Path, two: Recorder):
     write_all(two, tmp_path)
     for process in multiprocessing.active_children():
@@ -121,6 +122,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
 def test_processes_end_silently_with_the_one_that_started_them(tmp_path: Path, sent: signal.Signals):
     """Ctrl-C goes to all processes of a terminal; the only traceback is of the first one, whose command catches it."""

@@ -79,6 +79,7 @@ def test_what_takes_a_split_apart_is_found(code: str, lines: list[int]):
     assert list(taken_apart(code)) == lines
 
 
+@pytest.mark.slow
 def test_nothing_hands_on_the_cases_of_a_split_without_their_conditions():
     faults = [
         f"{place}:{line}"

@@ -85,6 +85,7 @@ def test_links_duplicates_and_unlisted_files_are_refused(submitted: Path, unsafe
     assert "holds agent/more.py, which its manifest does not list" in unlisted.refused(tmp_path / "into")
 
 
+@pytest.mark.slow
 def test_a_zip_bomb_is_refused_before_it_is_unpacked(unsafe: Unsafe, tmp_path: Path):
     bomb = unsafe.add("agent/zeros.pt", bytes(bundle.LARGEST + 1))
     assert "agent/zeros.pt is too large when unpacked (256 MiB)" in bomb.refused(tmp_path / "into")

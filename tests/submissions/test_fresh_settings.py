@@ -75,6 +75,7 @@ def test_the_scores_on_fresh_settings_name_what_they_follow_from(board: Path):
     assert table.loc[("near", "test"), "fresh"] == pytest.approx(mean)
 
 
+@pytest.mark.slow
 def test_the_terminal_shows_fresh_scores_and_the_mark(board: Path, capsys: pytest.CaptureFixture[str]):
     words = ["leaderboard", "show", "--runs", str(board / "results")]
     assert main.main(words) == 0

@@ -41,6 +41,7 @@ def test_shares_in_any_order_give_the_same_bytes(tmp_path: Path, monkeypatch: py
     assert file_contents(merged) == file_contents(tmp_path / "whole")  # Blocks that are not needed are gone.
 
 
+@pytest.mark.slow
 def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
     with pytest.raises(NotFound, match="lacks the blocks from 000000 on: the blocks before have 0 of 3000"):
         work_in(tmp_path).check_complete()

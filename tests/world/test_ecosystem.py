@@ -235,6 +235,7 @@ def test_an_environment_survives_its_spec_as_an_object_and_as_json():
     assert str(played_steps(copy.deepcopy(env))) == str(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_vector_environment_survives_its_spec(mode: str):
     env = gymnasium.make_vec(ID, 2, vectorization_mode=mode, reaches="minjerk", settings=MINJERK)

@@ -32,6 +32,7 @@ def test_the_registered_environment_passes_gymnasiums_checks_without_a_warning()
         env.step(env.action_space.sample())
 
 
+@pytest.mark.slow
 def test_the_rendered_picture_changes_with_the_state():
     env = GraspEnv(SOURCE, [SETTINGS[3]], render_mode="rgb_array")
     env.reset()

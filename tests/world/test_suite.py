@@ -122,6 +122,7 @@ def test_whole_episodes_are_bit_equal_to_those_of_the_engine():
         assert step.discount == (0.0 if reference.terminated else 1.0)
 
 
+@pytest.mark.slow
 def test_settings_are_played_in_turn_again_and_again():
     env = suite.load(SOURCE, SETTINGS[:2])
     settings = []

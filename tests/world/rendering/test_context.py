@@ -74,12 +74,14 @@ def printed(code: str, **environment: str) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 def test_a_process_forked_from_one_that_has_drawn_refuses_to_draw():
     lines = printed(FORK).splitlines()
     assert len(lines) == 2
     assert all("forked from one that has drawn" in line and "'spawn' or 'forkserver'" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_a_process_forked_before_the_first_picture_draws():
     assert printed(FORK_FIRST) == "0"
 
