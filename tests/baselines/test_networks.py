@@ -11,7 +11,6 @@ def stack_of(*seeds: int) -> Stack:
     return Stack.make(3, 2, [np.random.default_rng(seed) for seed in seeds])
 
 
-@pytest.mark.slow
 def test_two_hidden_relu_layers_by_hand():
     one, two = torch.ones(1, 1, 1), torch.tensor([[[2.0]]])
     stack = Stack([two, -one, one, one, two, 5.0 * one])  # 2 (relu(relu(2 x - 1) + 1)) + 5

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import dextron_bench
 from dextron_bench.methods.isolation.guard import PUBLIC
 
