@@ -125,10 +125,10 @@ class Cycle:
         losses: list[Tensor] = []
         scores: list[list[float]] = [[] for _ in self._seeds]
         for t in range(FRAMES):
-            is_warm = self._frames >= self._schedule.warm_start
-            noise_now = self._hold(acting[t] if is_warm else random[t], everywhere=not is_warm)
-            self._step(self._act(noise_now) if is_warm else noise_now, scores)
-            if is_warm or self._frames >= self._first_update:
+            is_random = self._frames < self._schedule.warm_start
+            noise_now = self._hold(random[t] if is_random else acting[t], everywhere=is_random)
+            self._step(noise_now if is_random else self._act(noise_now), scores)
+            if not is_random or self._frames >= self._first_update:
                 losses.append(self._algorithm.update(self._batch, [numbers[t] for numbers in drawn]))
         self.epoch += 1
         return self._metrics(losses, scores)

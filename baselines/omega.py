@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 import numpy as np
-from dextron_bench.errors import BadInput
 
 from dextron_bench import SuccessModel
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.sources import SOURCES
 from dextron_bench.storage import hashing, tensors
 from dextron_bench.success import network

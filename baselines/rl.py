@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import torch
-from dextron_bench.errors import BadInput
 from torch import Tensor
 
 from baselines import cycle, demonstrations
@@ -18,6 +17,7 @@ from baselines.random_streams import BATCHES, NOISE, Draws
 from baselines.sac import BATCH, Batch, Sac
 from baselines.schedule import SCHEDULES, Exploration, Schedule, Scheduled
 from dextron_bench import Trainer, TrainingSetup
+from dextron_bench.errors import BadInput
 
 HELD_SHARE = 0.25  # Share of the episodes after the warm start that hold their noise, if `hold` is above 1.
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dextron_bench.errors import BadInput
-
 from baselines.rl import Rl
 from baselines.sac import BATCH
+from dextron_bench.errors import BadInput
 
 
 @dataclass(frozen=True)

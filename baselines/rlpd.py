@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import torch
-from dextron_bench.errors import BadInput
 from torch import Tensor
 from torch.nn.functional import layer_norm
 
@@ -26,6 +25,7 @@ from baselines.random_streams import BATCHES, NOISE, PAIRS, Draws
 from baselines.sac import DISCOUNT, LEARNING_RATE, Batch, action_value_target
 from baselines.schedule import SCHEDULES, Scheduled
 from dextron_bench import Trainer, TrainingSetup
+from dextron_bench.errors import BadInput
 
 WARM_START = 1000  # Frames with random actions, before the first update.
 POLYAK = 0.005

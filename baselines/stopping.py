@@ -8,12 +8,12 @@ from itertools import chain
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from dextron_bench.errors import BadInput
 
 from baselines import expert_windows, generated_reaches, openings, pose_features, stopping_trainer
 from baselines.normalise import CLIP
 from baselines.stopping_trainer import EDGE
 from dextron_bench import Perceptron, Setting, Trainer, TrainingSetup
+from dextron_bench.errors import BadInput
 from dextron_bench.experts.openings import EVERY, NEAR, SUCCEEDS, OpeningSteps
 from dextron_bench.methods.exact import rounded
 from dextron_bench.world import task

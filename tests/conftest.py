@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import shutil
 from collections.abc import Callable, Generator, Iterator
@@ -15,7 +16,7 @@ from dextron_bench.cli.support import output
 from dextron_bench.reaches.recorded.cache import MissingData
 from dextron_bench.reaches.setting import Source
 from dextron_bench.reaches.sources import open_source
-from tests.helpers import abilities, forged_bundles, tiny_benchmark, tiny_training
+from tests.helpers import abilities, forged_bundles, forked_readers, tiny_benchmark, tiny_training
 from tests.helpers.browser import open_browser
 from tests.helpers.small_release import SmallRelease, make_small_release
 
@@ -59,6 +60,13 @@ def no_old_progress() -> None:
     output._Lines.printed = None
 
 
+@pytest.fixture(scope="session", autouse=os.name == "posix")
+def quick_readers() -> Iterator[None]:
+    """Files of strangers are read by copies of one process, which saves some hundred starts of Python."""
+    with forked_readers.installed():
+        yield
+
+
 @pytest.fixture(scope="session")
 def thorough(request: pytest.FixtureRequest) -> bool:
     """True if the slow tests that draw mutations and kills shall draw many more."""
@@ -81,12 +89,18 @@ def opened(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> C
 
     def opened(reaches: str) -> Source:
         try:
-            return open_source(reaches)
+            return _opened_once(reaches, os.environ.get("DEXTRON_CACHE"), os.environ.get("DEXTRON_DATA"))
         except MissingData:
             monkeypatch.setenv("DEXTRON_DATA", str(request.getfixturevalue("release")))
-            return open_source(reaches)
+            return _opened_once(reaches, os.environ.get("DEXTRON_CACHE"), os.environ["DEXTRON_DATA"])
 
     return opened
+
+
+@functools.cache
+def _opened_once(reaches: str, imported: str | None, release: str | None) -> Source:
+    """A source of reaches; `real` depends on the two variables, and takes seconds to read from a release."""
+    return open_source(reaches)
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ SDKS = {  # Packages of others that one place alone imports.
     "optuna": "dextron_bench/sweeps/optuna_search.py",
 }
 TOP = ("dextron_bench/__init__.py", "dextron_bench/__main__.py")  # Above all levels.
-PUBLIC = ("world.gym", "world.suite", "world.model", "world.task", "success.network")  # Public modules.
+PUBLIC = ("errors", "world.gym", "world.suite", "world.model", "world.task", "success.network")  # Public modules.
 BASELINES_ALSO = {  # Private modules that baselines import, and why an outside entrant needs none of them.
     "experts.openings": "closings tried in forks of the batched engine",
     "methods.exact": "rounding of an output that is not a perceptron's",

@@ -35,7 +35,8 @@ from dextron_bench.reaches.sources import RankedSource
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
 from dextron_bench.splits import hard
-from dextron_bench.splits.loading import SPLIT_NAMES, load_split
+from dextron_bench.splits.loading import load_split
+from dextron_bench.splits.names import SPLIT_NAMES
 from dextron_bench.storage import atomic
 from dextron_bench.world import model
 

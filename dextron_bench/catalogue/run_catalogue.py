@@ -14,6 +14,7 @@ from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.results import Code, Result, RunConfig
 from dextron_bench.methods.settings import Settings
 from dextron_bench.runs import annotations, playing, result_files
+from dextron_bench.splits.names import VAL
 from dextron_bench.storage import records, run_times
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.storage.run_times import RunTimes
@@ -22,7 +23,6 @@ from dextron_bench.training.learning_curve import CurvePoint
 from dextron_bench.world import task
 
 DONE, UNFINISHED = "done", "unfinished"
-VAL = "val"
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from dextron_bench.errors import BadInput
+from dextron_bench.splits.names import VAL
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from dextron_bench.catalogue.run_catalogue import CataloguedRun
 
 SCORES = ("return", "success")
-VAL = "val"  # Orders by the mean return on the split of this name, whatever the split is.
 ORDERS = ("name", "date", VAL, *SCORES)
 STATES = ("done", "training", "playing", "stopped", "unfinished", "failed")  # The first words of states.
 

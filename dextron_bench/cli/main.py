@@ -19,14 +19,13 @@ from dextron_bench.cli.commands import Command
 from dextron_bench.cli.support import method_flags, places, streams, usage
 from dextron_bench.cli.support.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.cli.support.output import print_warning
-from dextron_bench.errors import BadInput
+from dextron_bench.errors import BadInput, DextronError
 from dextron_bench.processes import programs
 from dextron_bench.processes.limited_process import memory_advice
 
 # The products of NumPy and of torch are small here: more threads would mostly wait for each other, above all on a busy
 # machine.
 THREADS = {"OPENBLAS_NUM_THREADS": "blas", "OMP_NUM_THREADS": "openmp"}
-PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
 LOOP = "Symlink loop"  # How `Path.resolve` begins to say so, before Python 3.13.
 PROGRAM = "dextron-bench"
 
@@ -115,7 +114,7 @@ def explain(error: BaseException) -> tuple[int, str]:
     text = " ".join(str(error.args[0] if isinstance(error, KeyError) and error.args else error).split())
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED, "interrupted"
-    if type(error).__module__.split(".")[0] in PACKAGES:
+    if isinstance(error, DextronError):
         return USAGE, text
     if isinstance(error, UnicodeEncodeError):  # Of a name on the disk: streams write what they lack as escapes.
         return USAGE, name_fault(_word_at(error.object, error.start))

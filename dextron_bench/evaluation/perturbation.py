@@ -16,8 +16,6 @@ from dextron_bench.storage import hashing
 from dextron_bench.world import model, task
 
 POSES = ((model.BOTTLE_POSITION, model.BOTTLE_QUATERNION), (model.PALM_POSITION, model.PALM_QUATERNION))
-FINGERS = slice(14, 25)
-LINEAR, ANGULAR = (25, 26, 27, 31, 32, 33), (28, 29, 30, *range(34, 48))  # Velocities [m/s] and [rad/s].
 
 
 class Perturbation:
@@ -71,7 +69,7 @@ def with_errors(states: np.ndarray, errors: np.ndarray, noise: Noise) -> np.ndar
         half_turn = 0.5 * noise.rotation * errors[:, quaternion][:, 1:]
         turn = rotation.unit(np.concatenate([np.ones((len(states), 1)), half_turn], axis=1))
         sensed[:, quaternion] = rotation.multiply(states[:, quaternion], turn)
-    sensed[:, FINGERS] += noise.angle * errors[:, FINGERS]
-    sensed[:, LINEAR] += noise.velocity * errors[:, LINEAR]
-    sensed[:, ANGULAR] += noise.turning * errors[:, ANGULAR]
+    sensed[:, model.FINGER_ANGLES] += noise.angle * errors[:, model.FINGER_ANGLES]
+    sensed[:, model.LINEAR_VELOCITIES] += noise.velocity * errors[:, model.LINEAR_VELOCITIES]
+    sensed[:, model.ANGULAR_VELOCITIES] += noise.turning * errors[:, model.ANGULAR_VELOCITIES]
     return sensed

@@ -38,7 +38,7 @@ class Training(Record, frozen=True):
     sha256: str = ""
     epochs: Count | None = None
     best_epoch: Count | None = None
-    seeds: tuple[Count, ...] = ()
+    seeds: list[Count] = field(default_factory=list)
     frames: Amount | UnsetType | None = UNSET
     demonstrations: Amount | UnsetType | None = UNSET
     seconds: Amount | UnsetType | None = UNSET

@@ -27,7 +27,7 @@ Begin = Callable[[np.ndarray, np.ndarray], np.ndarray]  # Starts numbered openin
 class Openings:
     """Episodes with an opening hand, one after the other: states (R, 48), float32, and `outcomes` (R,), int8.
 
-    OpeningSteps k has the rows from `starts[k]` to `starts[k + 1]`. An outcome says whether a hand that closes at full speed
+    Episode k has the rows from `starts[k]` to `starts[k + 1]`. An outcome says whether a hand that closes at full speed
     from that state on earns all rewards: SUCCEEDS, FAILS, or NO_DECISION. If two decisions that were tried have one
     outcome, the decisions between them are taken to have it too.
     """

@@ -9,7 +9,7 @@ import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.scores import cells
-from dextron_bench.splits.loading import SPLIT_NAMES
+from dextron_bench.splits.names import SPLIT_NAMES
 from dextron_bench.storage import atomic
 from dextron_bench.storage.printable import printable
 from dextron_bench.world import model

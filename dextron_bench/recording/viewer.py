@@ -31,9 +31,9 @@ class ViewerError(Failed):
 
 
 def require_screen() -> None:
-    """Raises Failed on Linux without a display."""
+    """Raises ViewerError on Linux without a display."""
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise Failed(
+        raise ViewerError(
             "there is no screen for the native viewer; `view --web` and `browse --web` open recordings in the browser"
         )
 
@@ -88,7 +88,7 @@ def _require(files: Sequence[Path]) -> None:
 def viewer_process(arguments: Sequence[str], logs: IO[bytes] | None = None) -> Iterator[subprocess.Popen[bytes]]:
     """Runs a viewer process; the end of the block ends it and its children.
 
-    Raises Failed if it would open a window where there is no screen.
+    Raises ViewerError if it would open a window where there is no screen.
     """
     if logs is None and HEADLESS not in arguments:
         require_screen()

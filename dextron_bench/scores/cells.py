@@ -5,6 +5,7 @@ A row is a mapping with the columns of `standings.table`. A missing or NaN value
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -92,4 +93,4 @@ def _score(row: Row, name: str, digits: int, unit: float = 1.0) -> Score:
 
 
 def _number(value: float | None, digits: int, unit: float = 1.0) -> str:
-    return "" if value is None or value != value else f"{unit * value:.{digits}f}"
+    return "" if value is None or math.isnan(value) else f"{unit * value:.{digits}f}"

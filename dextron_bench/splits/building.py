@@ -14,7 +14,8 @@ from dextron_bench.experts import policies
 from dextron_bench.experts.database import Summary
 from dextron_bench.reaches import setting
 from dextron_bench.splits import hard
-from dextron_bench.splits.loading import EVALUATED, SPLIT_NAMES, Catalogue, SplitEntry, entries
+from dextron_bench.splits.loading import Catalogue, SplitEntry, entries
+from dextron_bench.splits.names import EVALUATED, SPLIT_NAMES
 from dextron_bench.splits.near_equal import SETTING, without_near_equal
 from dextron_bench.splits.scanning import RANGE, Scanner, best_critical, success_window
 from dextron_bench.storage import atomic, records
@@ -109,9 +110,8 @@ def build(
     tried = summary.search.experts
     distance = hard.best_distance(scanner, parts["val"])
     held_out = pd.concat([part for name, part in parts.items() if name != "train"])
-    parts["hard"] = hard.draw(
-        scanner, parts["train"], held_out, distance, seed, sizes.evaluated, sizes.coarse, sizes.scan
-    )
+    settings = hard.HardSettings(scanner, parts["train"], held_out, distance, sizes.coarse, sizes.scan)
+    parts["hard"] = settings.draw(sizes.evaluated, seed)
     parts["open"] = draw_open(source, parts.values(), seed, sizes)
     solved = parts["train"].groupby(SETTING)["score"].transform("size").to_numpy()
     windows = RANGE * solved / tried

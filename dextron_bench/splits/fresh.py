@@ -112,7 +112,8 @@ def _hard(
     scanner, sizes = Scanner(source, engine), Sizes()
     train, val = (_frame(_cases(reaches, name)) for name in ("train", "val"))
     distance = hard.best_distance(scanner, val)
-    rows = hard.draw(scanner, train, train.head(0), distance, seed, count, sizes.coarse, sizes.scan, progress)
+    settings = hard.HardSettings(scanner, train, train.head(0), distance, sizes.coarse, sizes.scan)
+    rows = settings.draw(count, seed, progress)
     return rows.assign(window=0.0)
 
 

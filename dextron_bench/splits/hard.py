@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -22,53 +23,51 @@ APART = 0.01  # [m] largest distance, in x and in y, from the offset of the sett
 BLOCK = 256  # Settings that are drawn together.
 
 
-def draw(
-    scanner: Scanner,
-    train: pd.DataFrame,
-    held_out: pd.DataFrame,
-    distance: float,
-    seed: int,
-    count: int,
-    coarse: int,
-    fine: int,
-    progress: Progress = no_progress,
-) -> pd.DataFrame:
-    """`count` new settings near settings of `train` that the rule fails, with gain, best d_c and window.
+@dataclass(frozen=True, slots=True)
+class HardSettings:
+    """New settings near settings of `train` that the rule of thumb fails when it closes at `distance` [m].
 
-    Windows are at most WINDOW. The rule closes at `distance` [m], and solves at most RULE_SHARE of the rows. No setting
-    is near-equal to one of `train` or `held_out`. A scan of `coarse` points sorts out most draws, and one of `fine`
-    points decides.
+    No setting is near-equal to one of `train` or `held_out`. A scan of `coarse` points sorts out most draws, and one of
+    `fine` points decides.
     """
 
-    def by_rule(rows: pd.DataFrame) -> np.ndarray:
-        return rule_scores(scanner, rows, np.array([distance]))[:, 0] == task.SUCCESS
+    scanner: Scanner
+    train: pd.DataFrame
+    held_out: pd.DataFrame
+    distance: float
+    coarse: int
+    fine: int
 
-    settings = train.drop_duplicates(SETTING)
-    failed = settings[~by_rule(settings)]
-    hard, left = pd.DataFrame(), int(RULE_SHARE * count)  # `left`: how many more rows may be solved by the rule.
-    for number in itertools.count():
-        progress(min(len(hard), count), count)
-        if len(hard) >= count:
-            break
-        draws = _draw_block(failed, np.random.default_rng([seed, number, 5]))
-        if not left:  # Then no row that the rule solves is kept: it is sorted out before the scans, which take longer.
-            draws = draws[~by_rule(draws)]
-        rows = without_near_equal(without_near_equal(_narrow(scanner, draws, coarse, fine), train), held_out)
-        solved = by_rule(rows)
-        kept = ~solved | (np.cumsum(solved) <= left)
-        left -= int((solved & kept).sum())
-        hard = pd.concat([hard, rows[kept]], ignore_index=True)
-    return hard.head(count)
+    def draw(self, count: int, seed: int, progress: Progress = no_progress) -> pd.DataFrame:
+        """`count` settings with gain, best d_c and window, at most WINDOW; the rule solves at most RULE_SHARE."""
+        settings = self.train.drop_duplicates(SETTING)
+        failed = settings[~self._rule_solves(settings)]
+        hard, left = pd.DataFrame(), int(RULE_SHARE * count)  # `left`: how many more rows may be solved by the rule.
+        for number in itertools.count():
+            progress(min(len(hard), count), count)
+            if len(hard) >= count:
+                break
+            draws = _draw_block(failed, np.random.default_rng([seed, number, 5]))
+            if not left:  # Then no row that the rule solves is kept: it goes before the scans, which take longer.
+                draws = draws[~self._rule_solves(draws)]
+            rows = without_near_equal(without_near_equal(self._narrow(draws), self.train), self.held_out)
+            solved = self._rule_solves(rows)
+            kept = ~solved | (np.cumsum(solved) <= left)
+            left -= int((solved & kept).sum())
+            hard = pd.concat([hard, rows[kept]], ignore_index=True)
+        return hard.head(count)
 
+    def _rule_solves(self, rows: pd.DataFrame) -> np.ndarray:
+        return rule_scores(self.scanner, rows, np.array([self.distance]))[:, 0] == task.SUCCESS
 
-def _narrow(scanner: Scanner, draws: pd.DataFrame, coarse: int, fine: int) -> pd.DataFrame:
-    """The draws that have a narrow window, with best d_c and window."""
-    points = (scanner.scan(draws, coarse) == task.SUCCESS).sum(axis=1)
-    likely = draws[(points > 0) & (points <= np.ceil(WINDOW / RANGE * coarse))]
-    scores = scanner.scan(likely, fine)
-    windows = success_window(scores)
-    measured = likely.assign(critical=best_critical(scores), window=windows)
-    return measured[(windows > 0) & (windows <= WINDOW)]
+    def _narrow(self, draws: pd.DataFrame) -> pd.DataFrame:
+        """The draws that have a narrow window, with best d_c and window."""
+        points = (self.scanner.scan(draws, self.coarse) == task.SUCCESS).sum(axis=1)
+        likely = draws[(points > 0) & (points <= np.ceil(WINDOW / RANGE * self.coarse))]
+        scores = self.scanner.scan(likely, self.fine)
+        windows = success_window(scores)
+        measured = likely.assign(critical=best_critical(scores), window=windows)
+        return measured[(windows > 0) & (windows <= WINDOW)]
 
 
 def _draw_block(settings: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:

@@ -16,6 +16,7 @@ from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches import setting
 from dextron_bench.splits import tracks
+from dextron_bench.splits.names import EVALUATED, SPLIT_NAMES
 from dextron_bench.splits.rows import Rows
 from dextron_bench.splits.tracks import PLAIN, Track
 from dextron_bench.storage import hashing, records
@@ -23,8 +24,6 @@ from dextron_bench.storage.records import Count, Record
 from dextron_bench.world import bottle
 
 NUMBERS = ("offset_x", "offset_y", "duration_noise", "gain", "critical", "window")
-SPLIT_NAMES = ("train", "val", "test", "unseen-reach", "unseen-subject", "hard", "open")
-EVALUATED = ("test", "unseen-reach", "unseen-subject", "hard")
 
 
 class SplitEntry(Record, frozen=True):

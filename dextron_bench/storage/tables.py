@@ -131,4 +131,4 @@ def _value_bytes(value: Any) -> bytes:
         return value.encode()
     if hasattr(value, "__len__"):
         return np.ascontiguousarray(value, "<f8").tobytes()
-    return b"" if value is None or value != value else repr(float(value)).encode()
+    return b"" if pd.isna(value) else repr(float(value)).encode()

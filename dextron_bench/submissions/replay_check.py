@@ -82,7 +82,7 @@ def _played(
 
 def _equal(computed: Any, claimed: Any) -> bool:
     """True if two values are equal; NaN equals NaN."""
-    return bool(computed == claimed or (computed != computed and claimed != claimed))
+    return bool(computed == claimed or (pd.isna(computed) and pd.isna(claimed)))
 
 
 def _alike(computed: Row, claimed: Row) -> bool:

@@ -16,6 +16,7 @@ from dextron_bench.methods import registry
 from dextron_bench.methods.settings import Settings
 from dextron_bench.runs.plans import Plan, resolve
 from dextron_bench.splits.loading import load_split
+from dextron_bench.splits.names import VAL
 from dextron_bench.storage import atomic, folder_config, hashing, records
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.records import Count, Record
@@ -24,7 +25,6 @@ from dextron_bench.sweeps.space import Choices, Part, Space
 from dextron_bench.sweeps.trial import Trial, TrialRecord, best
 
 FOLDER, FILE = "sweeps", "sweep.json"  # In the folder of runs: sweeps/<name>/sweep.json.
-VAL = "val"
 CHOICE = "The winner has the highest mean return on val. The sweep has played no other split."
 
 

@@ -28,6 +28,9 @@ BOTTLE_POSITION = slice(0, 3)
 BOTTLE_QUATERNION = slice(3, 7)
 PALM_POSITION = slice(7, 10)
 PALM_QUATERNION = slice(10, 14)
+FINGER_ANGLES = slice(14, 25)
+LINEAR_VELOCITIES = (25, 26, 27, 31, 32, 33)  # Of bottle and palm [m/s].
+ANGULAR_VELOCITIES = (28, 29, 30, *range(34, 48))  # Of bottle, palm and fingers [rad/s].
 
 
 def mjcf() -> str:

@@ -7,12 +7,12 @@ from typing import cast
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 
 from baselines.exp import Exp
 from baselines.floors import Nothing, Random
 from baselines.omega import OmegaAgent
 from baselines.reflex import Reflex
+from dextron_bench.errors import BadInput
 from dextron_bench.experts.policies import Expert
 from dextron_bench.methods.agents import Agent, Privileged
 from dextron_bench.world import model, task

@@ -23,6 +23,7 @@ def generated() -> tuple[ReachSource, list[Setting]]:
     return generated_reaches.generate(SYNTHETIC, KNOWN, 6)
 
 
+@pytest.mark.slow
 def test_equal_settings_give_equal_reaches_and_other_reaches_give_other_names(
     generated: tuple[ReachSource, list[Setting]],
 ):
@@ -35,6 +36,7 @@ def test_equal_settings_give_equal_reaches_and_other_reaches_give_other_names(
     assert not set(others.names) & set(source.names)
 
 
+@pytest.mark.slow
 def test_generated_reaches_are_new_and_arrive_where_the_others_do(generated: tuple[ReachSource, list[Setting]]):
     """Each begins in the region of its number."""
     reaches = [generated[0].reach(name) for name in generated[0].names]
@@ -62,6 +64,7 @@ def test_the_arriving_palm_sees_a_known_offset(generated: tuple[ReachSource, lis
     assert all(len(source.path(one)) > 50 for one in settings)
 
 
+@pytest.mark.slow
 def test_offsets_stay_within_the_range_of_all_settings():
     corner = [Setting(name, OFFSET, OFFSET, 0.5) for name in SOME]
     _, settings = generated_reaches.generate(SYNTHETIC, corner, 20)

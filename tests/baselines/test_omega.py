@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 
 from baselines.omega import Omega, OmegaAgent, choose
 from dextron_bench.cli import main
+from dextron_bench.errors import BadInput
 from dextron_bench.methods import registry
 from dextron_bench.storage import hashing
 from dextron_bench.success.network import GRID, SuccessModel
@@ -149,6 +149,7 @@ def test_a_method_is_created_for_the_reaches_of_its_run(tmp_path: Path):
         registry.create("omega", {}, "minjerk")
 
 
+@pytest.mark.slow
 def test_from_the_command_line(tiny_world: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
     words = ["run", "--method", "omega", "--split", "test", "--quiet", "--record", "0"]
     assert "no success model ships for minjerk reaches" in complaint(*words, "--reaches", "minjerk")

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from dextron_bench.errors import BadInput
 from torch.testing import assert_close
 
 from baselines import cycle, demonstrations, rlpd
 from baselines.rlpd import Ensemble, Rlpd
 from baselines.sac import Batch
+from dextron_bench.errors import BadInput
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.methods.learners import TrainingSetup
 from dextron_bench.reaches.setting import Setting

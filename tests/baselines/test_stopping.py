@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from dextron_bench.errors import BadInput
 from torch.testing import assert_close
 
 from baselines import generated_reaches, openings, pose_features, stopping_trainer
 from baselines.stopping import Stopping, StoppingAgent
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Openings, OpeningSteps
 from dextron_bench.experts.policies import Case, Expert
@@ -31,6 +31,7 @@ def played() -> Openings:
     return openings.joined(openings.play(SOURCE, SETTINGS, threads=1))
 
 
+@pytest.mark.slow
 def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
     played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -125,6 +126,7 @@ def test_the_time_to_contact_by_hand():
     np.testing.assert_allclose(pose_features._time_to_contact(now, past, 3)[:, 0], [0.1, pose_features.LONGEST])
 
 
+@pytest.mark.slow
 def test_features_of_whole_episodes_equal_those_that_an_agent_sees(played: Openings):
     """Two episodes of different lengths in one history; the first row begins again after the shorter one."""
     first, second = (played.states[played.rows(number)].astype(float) for number in (0, 1))
@@ -188,6 +190,7 @@ def trainer(tmp_path: Path, played: Openings) -> Callable[..., stopping_trainer.
     return make
 
 
+@pytest.mark.slow
 def test_training_learns_to_close_where_closing_succeeds(
     trainer: Callable[..., stopping_trainer.StoppingTrainer], played: Openings
 ):
@@ -200,6 +203,7 @@ def test_training_learns_to_close_where_closing_succeeds(
     assert scores == [task.SUCCESS] * len(solvable)
 
 
+@pytest.mark.slow
 def test_it_learns_from_what_closing_can_solve_on_generated_reaches_too(
     played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

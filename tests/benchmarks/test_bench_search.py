@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from pathlib import Trajectory as File
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -84,7 +84,7 @@ def search_rows(draws: int, kept: int, seconds: float, reference_seconds: float)
 
 
 def test_open_recorded_reaches(
-    benchmark: BenchmarkFixture, release: File, tmp_path: File, monkeypatch: pytest.MonkeyPatch
+    benchmark: BenchmarkFixture, release: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path))
     cache.import_release(release)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 
 from dextron_bench.catalogue import episodes
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import tables
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput, NotFound
 
 from dextron_bench.catalogue import run_catalogue, run_search
 from dextron_bench.catalogue.expressions import BadExpression
 from dextron_bench.catalogue.run_catalogue import CataloguedRun
 from dextron_bench.catalogue.run_search import RunFilter
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.runs import annotations
 from dextron_bench.storage.run_folder import RunFolder
 

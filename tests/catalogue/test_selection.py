@@ -7,10 +7,10 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 
 from dextron_bench.catalogue import selection
 from dextron_bench.catalogue.selection import EpisodeFilter
+from dextron_bench.errors import BadInput
 
 COLUMNS = ["method", "reaches", "seed", "split", "row", "return", "steps", "cause"]
 TABLE = pd.DataFrame(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -29,13 +31,20 @@ sys.exit(main())
 
 
 def run(small_release: SmallRelease, *arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs the command line in a separate process, by default with an empty cache."""
-    inherited = {key: value for key, value in os.environ.items() if not key.startswith("DEXTRON_")}
-    cache = {"DEXTRON_CACHE": str(small_release.folder / "cache")}
-    command = [sys.executable, "-c", INJECT, str(small_release.manifest), *map(str, arguments)]
-    return subprocess.run(
-        command, env={**inherited, **cache, **environment}, capture_output=True, text=True, timeout=120
-    )
+    """Runs the command line, by default with an empty cache."""
+    words, streams = list(map(str, arguments)), (io.StringIO(), io.StringIO())
+    manifest = release.Manifest.load(small_release.manifest)
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(streams[0]), redirect_stderr(streams[1]):
+        for name in [name for name in os.environ if name.startswith("DEXTRON_")]:
+            patch.delenv(name)
+        for name, value in {"DEXTRON_CACHE": str(small_release.folder / "cache"), **environment}.items():
+            patch.setenv(name, value)
+        patch.setattr(release.Manifest, "load", lambda: manifest)
+        try:
+            code = main.main(words)
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+    return subprocess.CompletedProcess(words, code, *(stream.getvalue() for stream in streams))
 
 
 def complaint(done: subprocess.CompletedProcess[str]) -> str:
@@ -52,6 +61,7 @@ def with_line(content: bytes, number: int, line: bytes) -> bytes:
     return b"".join(lines)
 
 
+@pytest.mark.slow
 def test_import_then_info(small_release: SmallRelease):
     done = run(small_release, "data", "import", "--from", small_release.zip())
     assert (done.returncode, done.stderr) == (0, "")
@@ -81,6 +91,7 @@ DAMAGE = {
 QUICK = ("truncated", "value")  # The others are slow, since each starts a process.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=[] if k in QUICK else pytest.mark.slow) for k in DAMAGE])
 def test_damage_is_one_line_with_file_and_position(small_release: SmallRelease, kind: str):
     file, damage, expected = DAMAGE[kind]
@@ -142,12 +153,14 @@ def test_every_command_has_an_example(capsys: pytest.CaptureFixture[str]):
             assert f"Example: dextron-bench {' '.join([name, *inner])}" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_help_imports_nothing_heavy():
     script = "import sys; from dextron_bench.cli import main; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert not {"torch", "mujoco", "scipy", "pandas", "matplotlib", "rerun", "pyarrow"} & set(loaded)
 
 
+@pytest.mark.slow
 def test_a_pipe_that_closes_early_is_no_error(small_release: SmallRelease):
     run(small_release, "data", "import", "--from", small_release.zip())
     command = [sys.executable, "-c", INJECT, str(small_release.manifest), "data", "info"]

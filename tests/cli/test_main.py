@@ -129,6 +129,7 @@ def test_a_process_has_the_same_exit_codes(here: Path):
     assert err.startswith("dextron-bench: no method 'nosuch'; choose from ")
 
 
+@pytest.mark.slow
 def test_help_and_the_package_itself_import_nothing_heavy():
     script = "import sys\ntry:\n from dextron_bench.cli.main import main; main(['--help'])\nexcept SystemExit: pass\n"
     done = subprocess.run(
@@ -140,6 +141,7 @@ def test_help_and_the_package_itself_import_nothing_heavy():
     assert not HEAVY & set(loaded.split())
 
 
+@pytest.mark.slow
 def test_products_of_numpy_and_torch_use_one_thread_by_default():
     script = (
         "from dextron_bench.cli.main import main; main(['--version']); import numpy, threadpoolctl, torch; "

@@ -99,6 +99,7 @@ def test_the_best_of_a_grid_is_chosen_on_val_alone(here: Path, capsys: pytest.Ca
     assert "best so far: mine-near" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_scores_are_drawn_against_the_setting(here: Path, monkeypatch: pytest.MonkeyPatch):
     drawn: list[list[sweeps.Point]] = []
     draw = sweeps.scaling
@@ -112,6 +113,7 @@ def test_the_scores_are_drawn_against_the_setting(here: Path, monkeypatch: pytes
     assert values == [(0.95, False), (float(SOLVES), True)]
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_continues_with_equal_results(here: Path, monkeypatch: pytest.MonkeyPatch):
     def run(runs: str) -> int:
         words = ["--preset", "smoke", "--search", "rate=0.01..1:log", "--trials", "3", "--seed", "0", "1"]
@@ -149,6 +151,7 @@ def test_a_training_is_stopped_early(here: Path, monkeypatch: pytest.MonkeyPatch
     assert json.loads(capsys.readouterr().out)[0]["state"] == "stopped, 1 of 5 epochs left"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "line"),
     [
@@ -192,6 +195,7 @@ def test_a_class_that_is_no_dataclass_has_flags_too(here: Path, monkeypatch: pyt
     assert content()["winner"]["run"] == f"plain-near{float(SOLVES)}/synthetic"
 
 
+@pytest.mark.slow
 def test_the_story_of_the_docs_runs_as_written(here: Path, capsys: pytest.CaptureFixture[str]):
     page = (Path(__file__).parents[2] / "docs/sweeps.md").read_text()
     story = page.partition("## A story")[2].partition("## What to vary")[0]

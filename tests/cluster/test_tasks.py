@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dextron_bench.errors import BadInput
 
 from dextron_bench.cli import main
 from dextron_bench.cluster import inputs, installation, ray_cluster, worker
 from dextron_bench.cluster.tasks import ResultFile, Task, content_hash, write_files
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import atomic
 from tests.helpers.immediate_cluster import ImmediateCluster, performed
 

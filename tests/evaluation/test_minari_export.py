@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from dextron_bench.errors import BadInput
 
 from baselines.floors import Nothing
 from dextron_bench.cli import main
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation import minari_export
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert, ExpertAgent
@@ -132,6 +132,7 @@ def test_a_failed_export_raises_and_leaves_nothing(tmp_path: Path, monkeypatch: 
         write(tmp_path / "b", [STILL])
 
 
+@pytest.mark.slow
 def test_a_policy_learned_from_the_data_set_beats_the_mean_action_on_other_episodes(tmp_path: Path):
     rng = np.random.default_rng(0)
     cases = tuple(Case(SOURCE.sample(rng), Expert(1.2, 0.4), 0.0) for _ in range(20))
@@ -175,6 +176,7 @@ def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return training_world
 
 
+@pytest.mark.slow
 def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
     words = ["data", "export", "--into", "sets", "--split", "test"]
     assert main.main([*words, "--json"]) == 0

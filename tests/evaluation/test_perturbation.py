@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dextron_bench.evaluation.episodes import Episode
-from dextron_bench.evaluation.perturbation import FINGERS, Perturbation, with_errors
+from dextron_bench.evaluation.perturbation import Perturbation, with_errors
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import Case, Expert
@@ -78,6 +78,7 @@ def test_episodes_do_not_depend_on_slots_or_order(name: str):
             np.testing.assert_array_equal(together[k].actions, other.actions)
 
 
+@pytest.mark.slow
 def test_tracks_differ_from_plain_episodes_and_a_track_without_conditions_does_not():
     plain, unconditional = played(PLAIN), played(Track("nothing"))
     for k in range(len(CASES)):
@@ -97,7 +98,7 @@ def test_errors_have_their_sizes_and_orientations_stay_of_unit_length():
     errors = sensed - states
     for columns, size in (
         ([0, 1, 2, 7, 8, 9], 0.01),
-        (FINGERS, 0.2),
+        (model.FINGER_ANGLES, 0.2),
         ([25, 26, 27, 31, 32, 33], 0.3),
         ([28, 34, 47], 0.4),
     ):

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import database
 from dextron_bench.experts.montecarlo import Search
 from dextron_bench.storage import atomic

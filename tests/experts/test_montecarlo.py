@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput, NotFound
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import blocks, database, montecarlo, outcomes, policies
 from dextron_bench.experts.blocks import Tally
@@ -78,6 +78,7 @@ def test_a_block_depends_only_on_its_number_and_the_seed():
     assert not first.equals(montecarlo.draw(SOURCE, Search("brief", 4, 3, 4), 7))
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_at_any_slots_and_threads_and_after_interruptions(tmp_path):
     whole = search(tmp_path / "whole", rows=2)
     assert (whole["score"] == 20).sum() >= 2
@@ -91,6 +92,7 @@ def test_rows_are_the_same_at_any_slots_and_threads_and_after_interruptions(tmp_
     pd.testing.assert_frame_equal(search(broken, rows=2), whole)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_episodes")
 @pytest.mark.parametrize("of", [1, 2, 3])
 def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -149,6 +151,7 @@ def test_two_machines_are_named_in_the_summary(tmp_path: Path, monkeypatch: pyte
     assert [makers.machine.cpu, *(maker.machine.cpu for maker in makers.others)] == ["large", "small"]
 
 
+@pytest.mark.slow
 def test_outcomes_equal_the_outcomes_of_experts_played_one_by_one(tmp_path):
     table = search(tmp_path, rows=1)
     agents = [policies.Expert(gain, critical) for gain, critical in zip(table["gain"], table["critical"], strict=True)]

@@ -38,6 +38,7 @@ def played() -> Openings:
     return openings.joined(openings.play(SOURCE, SETTINGS, threads=1))
 
 
+@pytest.mark.slow
 def test_an_outcome_is_the_end_of_an_episode_that_closes_there(played: Openings):
     """All decisions that were tried are played again, each from its start by an agent that closes at that step."""
     for number in (0, 1):
@@ -49,6 +50,7 @@ def test_an_outcome_is_the_end_of_an_episode_that_closes_there(played: Openings)
     assert set(played.outcomes) == {NO_DECISION, FAILS, SUCCEEDS}
 
 
+@pytest.mark.slow
 def test_decisions_begin_near_the_bottle_and_come_every_second_step(played: Openings):
     for number in range(len(played)):
         rows = played.rows(number)

@@ -13,6 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 from dextron_bench.reaches import sources
+from dextron_bench.runs import result_files
 from dextron_bench.splits import loading
 from dextron_bench.splits.loading import _catalogue, _table, split_digest
 from tests.helpers.short_reaches import SOURCE
@@ -44,8 +45,12 @@ def write(folder: Path, rows: pd.DataFrame = ROWS, table: str = f"splits-{NAME}.
 
 
 def install(folder: Path, put: Callable[[object, str, object], None] = setattr) -> None:
-    """Replaces the shipped splits and their source; `put` sets attributes, as `setattr` does."""
+    """Replaces the shipped splits and their source; `put` sets attributes, as `setattr` does.
+
+    No published result has played these splits, so that none is read.
+    """
     put(loading, "files", lambda package: folder)
+    put(result_files, "published_results", lambda: folder / "published")
     put(sources, "SOURCES", {**sources.SOURCES, NAME: lambda: SOURCE})
     forget()
 

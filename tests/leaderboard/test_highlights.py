@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from dextron_bench.errors import BadInput
 
 from dextron_bench import recording
 from dextron_bench.catalogue import episodes
 from dextron_bench.cli import main
+from dextron_bench.errors import BadInput
 from dextron_bench.leaderboard import highlights
 from dextron_bench.success import network
 from tests.helpers import fixed_success_model
@@ -23,6 +23,7 @@ def runs(two_runs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return two_runs / "runs"
 
 
+@pytest.mark.slow
 def test_each_method_has_its_shortest_episodes_and_each_kind_its_clearest(runs: Path):
     chosen = highlights.choose(runs, ["synthetic"], "test", rows=100)
     names = chosen["name"].tolist()
@@ -37,6 +38,7 @@ def test_each_method_has_its_shortest_episodes_and_each_kind_its_clearest(runs: 
         assert recording.read(file).episode.score == score
 
 
+@pytest.mark.slow
 def test_exemplars_are_of_any_method_and_outcomes_of_the_methods_that_are_named(runs: Path):
     every, few = (highlights.choose(runs, ["synthetic"], "test", 100, methods) for methods in ((), ("nothing",)))
     assert few["name"].tolist() == [name for name in every["name"] if name != "exp-success"]

@@ -54,6 +54,7 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     assert "table.csv differs" in printed
 
 
+@pytest.mark.slow
 def test_missing_and_additional_seeds_on_the_board_are_problems(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
@@ -71,6 +72,7 @@ def test_missing_and_additional_seeds_on_the_board_are_problems(
     assert "has seed0, but its manifest has seed0, seed1" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_an_interrupted_addition_can_be_repeated(submitted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     board, words = tmp_path / "board", ["leaderboard", "add", str(submitted / "near.zip"), "--board"]
     assert main.main([*words, str(board)]) == 0
@@ -84,6 +86,7 @@ def test_an_interrupted_addition_can_be_repeated(submitted: Path, tmp_path: Path
     assert not (tmp_path / ".board.part").exists()
 
 
+@pytest.mark.slow
 def test_view_records_any_episode_of_a_bundle(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
@@ -107,6 +110,7 @@ def test_view_records_any_episode_of_a_bundle(
     assert sorted(path.name for path in (tmp_path / "runs/submissions/.bundles").iterdir()) == [Path(file).parts[3]]
 
 
+@pytest.mark.slow
 def test_baselines_on_a_board_are_run_again(submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """Actions of `random` depend on which rows are played together, so the verifier plays all its rows."""
     runs, board = str(tmp_path / "runs"), tmp_path / "board"
@@ -141,6 +145,7 @@ def test_baselines_on_a_board_are_run_again(submitted: Path, tmp_path: Path, cap
     assert "its methods: exp, random" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_invalid_submission_is_refused_with_the_reason(submitted: Path, capsys: pytest.CaptureFixture[str]):
     for words, reason in (
         (["--name", "a/b"], "'a/b' is not a valid name"),

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods import weights
 from dextron_bench.storage import tensors
 

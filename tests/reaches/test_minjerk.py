@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import policies
 from dextron_bench.reaches.minjerk import (
     LIFT_STEPS,
@@ -121,6 +121,7 @@ def test_start_regions_go_from_near_to_far_and_from_x_to_y():
     assert source.stratum(widest).angle == 0  # Nearest to the -x side.
 
 
+@pytest.mark.slow
 def test_the_papers_expert_lifts_the_bottle():
     names = [name for name in MinjerkSource().names if abs(Draw.from_name(name).height) < 0.01][:3]
     engine, ids = Engine(len(names), threads=1), np.arange(len(names))

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches import rotation
 from dextron_bench.reaches.reach import PALM_AHEAD, PALM_CENTRE, Curve, Reach, clean, palm_centre, path, scaled_duration
 from dextron_bench.reaches.recorded.cache import load_reaches

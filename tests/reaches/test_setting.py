@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 
 import dextron_bench
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.reach import scaled_duration
 from dextron_bench.reaches.setting import LIMITS, OFFSET, Setting, UnknownReach, from_frame, to_frame
 from tests.helpers.short_reaches import SETTINGS, SOURCE

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 from rerun.chunk import RrdReader
 
 from dextron_bench import recording
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.replay import replay
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 

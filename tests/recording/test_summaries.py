@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 import rerun as rr
-from dextron_bench.errors import Failed
 
 from dextron_bench import recording
+from dextron_bench.errors import Failed
+from dextron_bench.processes import limited_process
 from dextron_bench.recording import reader_process
 from dextron_bench.recording.summaries import NEEDED
 from tests.helpers import many_processors
@@ -101,6 +102,7 @@ def test_other_applications_other_versions_and_damage_have_different_messages(wh
     assert reported[3] == ""
 
 
+@pytest.mark.slow
 def test_a_changed_value_is_noticed_if_all_of_the_file_is_read(whole: Path, tmp_path: Path):
     changed = tmp_path / "changed.rrd"
     content = bytearray(whole.read_bytes())
@@ -131,13 +133,13 @@ def test_a_file_that_aborts_its_reader_is_reported_and_the_other_files_are_read(
 
 
 def test_one_process_screens_several_files(whole: Path, monkeypatch: pytest.MonkeyPatch):
-    commands, run = [], subprocess.run
+    commands, run = [], limited_process.run
 
-    def counted(command: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
+    def counted(*command: Any) -> limited_process.Outcome:
         commands.append(command)
-        return run(command, **options)
+        return run(*command)
 
-    monkeypatch.setattr(subprocess, "run", counted)
+    monkeypatch.setattr(limited_process, "run", counted)
     cut = whole.with_name("cut.rrd")
     cut.write_bytes(whole.read_bytes()[:999])
     first, second, third = recording.screen([whole, cut, whole])
@@ -174,6 +176,7 @@ def test_recordings_are_read_on_a_machine_with_many_processors(whole: Path, tmp_
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_recording_without_a_footer_of_a_version_that_writes_none_is_read(whole: Path, tmp_path: Path):
     """Rerun 0.26 ends a file with no footer."""
     file, content = tmp_path / "older.rrd", whole.read_bytes()

@@ -33,6 +33,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(file.relative_to(folder)): file.read_bytes() for file in files if file.name != "times.json"}
 
 
+@pytest.mark.slow
 def test_a_second_execution_computes_nothing_and_changes_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     folder = execute(tmp_path, PLAN)
     before, times = contents(folder), (folder / "times.json").read_bytes()
@@ -43,6 +44,7 @@ def test_a_second_execution_computes_nothing_and_changes_no_byte(tmp_path: Path,
     assert (folder / "times.json").read_bytes() == times
 
 
+@pytest.mark.slow
 def test_a_run_killed_between_splits_ends_with_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     unbroken = contents(execute(tmp_path / "unbroken", PLAN))
 
@@ -95,6 +97,7 @@ def test_the_result_is_computed_from_the_episodes(tmp_path: Path):
     assert episodes["success"].all()
 
 
+@pytest.mark.slow
 def test_the_stored_actions_reproduce_every_episode(tmp_path: Path):
     rows = pd.read_parquet(execute(tmp_path, PLAN) / "episodes.parquet")
     replayed = dict(replay(SOURCE, from_frame(rows), rows["actions"].tolist(), threads=1))
@@ -136,6 +139,7 @@ def test_progress_counts_the_episodes_of_each_split(tmp_path: Path):
     assert not [file for file in os.listdir(tmp_path / "nothing" / "synthetic" / "seed0") if file.endswith(".part")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spec", "settings"),
     [("tests.helpers.toy_learner:Toy", {"preset": "quick"}), ("tests.helpers.toy_learner:ToyTransfer", {})],

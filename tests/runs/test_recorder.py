@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from dextron_bench.errors import Failed
 
 from dextron_bench import recording
+from dextron_bench.errors import Failed
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.recording.rrd_file import UnwritableRecording
@@ -48,6 +48,7 @@ def write_all(writer: Recorder, folder: Path) -> dict[str, str]:
     return {file.name: sha256 for file, sha256 in writer.hashes().items()}
 
 
+@pytest.mark.slow
 def test_processes_write_what_this_process_writes(tmp_path: Path, two: Recorder, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(recorder, "AHEAD", 1)  # The third recording waits for the first one.
     (tmp_path / "beside").mkdir()
@@ -65,6 +66,7 @@ def test_processes_write_what_this_process_writes(tmp_path: Path, two: Recorder,
         assert (one.episode.states == other.episode.states).all()
 
 
+@pytest.mark.slow
 def test_a_recording_that_cannot_be_written_is_named(tmp_path: Path, two: Recorder):
     (tmp_path / "taken").write_text("")
     two.write(tmp_path / "taken" / "0.rrd", CASES[0], EPISODES[0], {})
@@ -74,6 +76,7 @@ def test_a_recording_that_cannot_be_written_is_named(tmp_path: Path, two: Record
     assert list(two.hashes()) == [tmp_path / "1.rrd"]  # The process goes on.
 
 
+@pytest.mark.slow
 def test_a_process_that_was_killed_is_named(tmp_path: Path, two: Recorder):
     write_all(two, tmp_path)
     for process in multiprocessing.active_children():
@@ -102,8 +105,9 @@ def test_an_error_of_the_rollout_ends_all_processes_after_what_they_write(
 
 
 PROGRAM = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
+signal.signal(signal.SIGINT, signal.default_int_handler)  # A shell's job in the background would ignore it.
 sys.path.insert(0, {root!r})
 from dextron_bench.runs import recorder
 from tests.runs.test_recorder import CASES, EPISODES, SOURCE
@@ -118,6 +122,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
 def test_processes_end_silently_with_the_one_that_started_them(tmp_path: Path, sent: signal.Signals):
     """Ctrl-C goes to all processes of a terminal; the only traceback is of the first one, whose command catches it."""

@@ -21,6 +21,7 @@ from tests.helpers import tiny_benchmark
 from tests.helpers.tiny_runs import constant_agent, execute, forbidden
 
 
+@pytest.mark.slow
 def test_a_recording_reads_back_as_the_episode(tmp_path: Path):
     folder = execute(tmp_path, Plan("exp", "synthetic", ("test",), seed=3, record=1))
     assert [file.name for file in (folder / "recordings").iterdir()] == ["test-0000.rrd"]

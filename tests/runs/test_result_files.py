@@ -8,10 +8,10 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from dextron_bench.errors import NotFound
 from msgspec import to_builtins
 from msgspec.structs import replace
 
+from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.results import Result, scores_by_split
 from dextron_bench.runs import result_files
 from dextron_bench.storage import records

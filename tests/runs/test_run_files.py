@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.runs.plans import Plan
 from dextron_bench.storage.atomic import DamagedFile
 from tests.helpers.tiny_runs import constant_agent, execute

@@ -25,6 +25,7 @@ def test_equal_comparisons_give_equal_bytes(suffix: str, tmp_path: Path, monkeyp
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".svg", ".png"])
 def test_last_bits_of_a_layout_change_no_byte(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """The solver of the layout gives other last bits in other places of the memory."""

@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 from msgspec.structs import replace
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.results import Result
 from dextron_bench.scores import standings
 from dextron_bench.splits import strata

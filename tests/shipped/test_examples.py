@@ -26,6 +26,7 @@ def example(name: str) -> ModuleType:
     return module
 
 
+@pytest.mark.slow
 def test_random_actions_through_gymnasium(capsys: pytest.CaptureFixture[str]):
     finished = example("gymnasium_random").main(steps=250)
     assert finished > 0

@@ -21,6 +21,7 @@ from dextron_bench.training import learning_curve
 
 BOARD = Path(__file__).parents[2] / "leaderboard"
 RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))
+QUICK = ("bc/real/seed0", "rlil-0.1/synthetic/seed0", "stopping/real/seed0")  # Replayed without the slow tests, too.
 WEIGHTS = sorted((Path(baselines.__file__).parent / "weights").glob("*/*/seed*.safetensors"))
 
 
@@ -49,6 +50,7 @@ def test_experts_solve_every_row_of_the_splits_that_can_be_solved(file: Path):
         assert split_name == "open" or set(split.scores) == {20.0}
 
 
+@pytest.mark.slow
 def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
     rebuilt = tmp_path / "board"
     shutil.copytree(BOARD, rebuilt)
@@ -71,7 +73,7 @@ def test_weights_that_ship_made_the_published_result(file: Path):
 @pytest.mark.parametrize(
     ("file", "rows"),
     [
-        *(pytest.param(file, 2, id=f"{name(file)}-2") for file in WEIGHTS if file.stem == "seed0"),
+        *(pytest.param(file, 2, id=f"{name(file)}-2") for file in WEIGHTS if name(file) in QUICK),
         *(pytest.param(file, 8, id=f"{name(file)}-8", marks=pytest.mark.slow) for file in WEIGHTS),
     ],
 )

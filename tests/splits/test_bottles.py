@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.splits import bottles, loading, tracks
 from dextron_bench.splits.near_equal import SETTING
 from dextron_bench.storage import atomic, records

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import branching
 from dextron_bench.experts.branching import ExpertBatch, Outcomes
@@ -57,6 +57,7 @@ def test_the_expert_of_a_setting_is_drawn_among_those_that_solve_it():
     assert counts.min() > 30
 
 
+@pytest.mark.slow
 def test_equal_seeds_draw_equal_settings_and_other_seeds_do_not():
     pd.testing.assert_frame_equal(solved(7, 20), solved(7).head(20))
     assert not set(solved(8)["offset_x"]) & set(solved(7)["offset_x"])

@@ -38,7 +38,7 @@ TRAIN = pd.DataFrame([[NAMES[0], 0.03, -0.005, 0.3], [NAMES[0], 0.03, 0.03, 0.7]
 
 @pytest.fixture(scope="module")
 def rows(scanner) -> pd.DataFrame:
-    return hard.draw(scanner, TRAIN, TRAIN.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
+    return hard.HardSettings(scanner, TRAIN, TRAIN.head(0), 0.065, coarse=16, fine=64).draw(COUNT, seed=0)
 
 
 def test_windows_are_narrow_and_the_expert_is_in_their_middle(rows):
@@ -60,7 +60,7 @@ def test_the_rule_solves_a_share_and_no_more(scanner, monkeypatch):
     """Near this setting it solves half of the draws, so a limit of a quarter is reached."""
     monkeypatch.setattr(hard, "RULE_SHARE", 0.25)
     train = TRAIN.head(1).assign(offset_y=0.0)
-    drawn = hard.draw(scanner, train, train.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
+    drawn = hard.HardSettings(scanner, train, train.head(0), 0.065, coarse=16, fine=64).draw(COUNT, seed=0)
     assert (drawn["offset_y"] > 0.0).sum() == COUNT // 4
 
 
@@ -75,19 +75,19 @@ def test_what_the_rule_solves_is_not_scanned_once_its_share_is_full(monkeypatch)
 
     monkeypatch.setattr(hard, "RULE_SHARE", 0.0)
     noting = Noting(SOURCE, None)  # type: ignore[arg-type]
-    drawn = hard.draw(noting, TRAIN, TRAIN.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
+    drawn = hard.HardSettings(noting, TRAIN, TRAIN.head(0), 0.065, coarse=16, fine=64).draw(COUNT, seed=0)
     assert len(drawn) == COUNT
     assert max(scanned) <= 0.0
 
 
 def test_offsets_stay_within_the_range_of_all_settings(scanner):
     train = TRAIN.head(1).assign(offset_y=-0.059)
-    drawn = hard.draw(scanner, train, train.head(0), 0.065, 0, COUNT, coarse=16, fine=64)
+    drawn = hard.HardSettings(scanner, train, train.head(0), 0.065, coarse=16, fine=64).draw(COUNT, seed=0)
     assert drawn["offset_y"].min() == -0.06
 
 
 def test_equal_seeds_draw_equal_rows_and_near_equal_settings_are_left_out(scanner, rows):
-    again = hard.draw(scanner, TRAIN, rows.head(1), 0.065, 0, COUNT, coarse=16, fine=64)
+    again = hard.HardSettings(scanner, TRAIN, rows.head(1), 0.065, coarse=16, fine=64).draw(COUNT, seed=0)
     assert len(without_near_equal(again, rows.head(1))) == COUNT
     distant = without_near_equal(rows, rows.head(1))
     assert set(distant["offset_x"]) < set(again["offset_x"])

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.experts import policies
 from dextron_bench.splits.loading import (
     UnknownSplit,

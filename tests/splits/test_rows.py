@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from dextron_bench.errors import NotFound
 
 import dextron_bench
+from dextron_bench.errors import NotFound
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.splits.loading import Split
@@ -79,6 +79,7 @@ def test_what_takes_a_split_apart_is_found(code: str, lines: list[int]):
     assert list(taken_apart(code)) == lines
 
 
+@pytest.mark.slow
 def test_nothing_hands_on_the_cases_of_a_split_without_their_conditions():
     faults = [
         f"{place}:{line}"

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import folder_config, provenance
 from dextron_bench.storage.atomic import DamagedFile
 from tests.helpers import conditions
@@ -62,7 +62,7 @@ def test_a_folder_without_a_config_passes_the_check(tmp_path: Path):
         ({"settings": {"shape": [2, 3]}}, r"settings \(rate\)"),
         ({"settings": CONFIG["settings"] | {"more": 1, "rate": 1.0}}, r"settings \(more, rate\)"),
         ({"settings": None}, "settings"),
-        ({"seed": 1, "physics": "def"}, "seed and physics"),
+        ({"seed": 1, "physics": "def"}, "physics and seed"),
     ],
 )
 def test_another_config_is_refused_and_the_differing_settings_are_named(
@@ -94,6 +94,7 @@ def test_a_damaged_config_is_named(tmp_path: Path):
 WRITER = """
 import sys
 from pathlib import Path
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import folder_config, provenance
 provenance.collect = lambda physics: provenance.Provenance(git="1234")
 folder, seed = Path(sys.argv[1]), int(sys.argv[2])
@@ -131,6 +132,7 @@ def simultaneous(folder: Path, seeds: Sequence[int], *names: str) -> list[list[s
         return answers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("process_one",), ("process_one", "no_links")], ids="+".join)
 def test_processes_with_one_number_write_one_config(tmp_path: Path, names: tuple[str, ...]):
     """Two containers that share a folder are both process 1; none loses a temporary file to the other one."""
@@ -139,6 +141,7 @@ def test_processes_with_one_number_write_one_config(tmp_path: Path, names: tuple
         assert sorted(os.listdir(tmp_path / str(number))) == ["config.json", "provenance.json", "times.json"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("process_one",), ("process_one", "no_links")], ids="+".join)
 def test_of_two_configs_written_at_the_same_time_one_wins_and_the_other_is_refused(
     tmp_path: Path, names: tuple[str, ...]

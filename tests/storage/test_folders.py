@@ -12,8 +12,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from dextron_bench.errors import Failed
 
+from dextron_bench.errors import Failed
 from dextron_bench.storage import folders
 
 ROOT = Path(__file__).parents[2]
@@ -63,6 +63,7 @@ def test_hidden_names_are_not_listed(tmp_path: Path):
     assert folders.visible(tmp_path / "none", "*") == []
 
 
+@pytest.mark.slow
 def test_only_one_module_lists_folders():
     def lists(file: Path) -> bool:
         nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))

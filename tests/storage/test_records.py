@@ -113,6 +113,7 @@ def test_a_number_that_overflows_is_not_finite(tmp_path: Path):
         learning_curve.read(tmp_path / "a.json")
 
 
+@pytest.mark.slow
 def test_a_json_file_is_read_as_a_record():
     """Bundles have their own reader, since they come from strangers."""
     readers = [

@@ -43,5 +43,5 @@ def test_a_run_of_an_earlier_version_has_no_times(run: RunFolder):
 def test_a_time_without_a_zone_is_refused(run: RunFolder, moment: object):
     run.path.mkdir(parents=True)
     run.times.write_text(json.dumps({"began": moment}))
-    with pytest.raises(DamagedFile, match=r"times\.json is damaged or of another version \(began is not"):
+    with pytest.raises(DamagedFile, match=r"times\.json is damaged or of another version \(began: "):
         run_times.read(run)

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dextron_bench.errors import BadInput, NotFound
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.storage import atomic, block_work, provenance, shares
 from dextron_bench.storage.pieces import ListedWork, Recipe
 from dextron_bench.storage.progress import Progress, no_progress

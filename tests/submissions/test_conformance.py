@@ -35,6 +35,7 @@ def check(tmp_path: Path, act: str) -> dict[str, Check]:
     return {check.what: check for check in checks(launch, limits=Limits(answer=20.0))}
 
 
+@pytest.mark.slow
 def test_the_template_passes_the_checks_and_its_own_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     folder = tmp_path / "mine"
     assert main.main(["new-agent", str(folder)]) == 0
@@ -54,6 +55,7 @@ def test_random_numbers_without_the_seed_are_a_fault(tmp_path: Path):
     assert results["actions do not depend on other rows"].verdict == NOTE
 
 
+@pytest.mark.slow
 def test_actions_that_depend_on_other_rows_are_noted(tmp_path: Path):
     results = check(tmp_path, "return np.full((len(states), 1), 1.0 / len(states))")
     assert results["it is deterministic under a seed"].verdict == OK

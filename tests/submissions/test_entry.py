@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.submissions import entry
 from dextron_bench.submissions.entry import Entry
 from dextron_bench.submissions.manifest import Agent

@@ -20,6 +20,7 @@ from tests.helpers.forged_bundles import Forgery, row
 from tests.helpers.results import result
 
 
+@pytest.mark.slow
 def test_an_edited_result_is_refused(forged: Forgery):
     def better(result: dict[str, Any]) -> None:
         result["splits"]["test"]["scores"][2] = 20.0
@@ -67,6 +68,7 @@ def test_other_vector_extensions_make_another_platform():
     assert result_check.same_platform(replace(here, machine=provenance.Machine()))
 
 
+@pytest.mark.slow
 def test_on_another_platform_only_outcomes_must_agree(forged: Forgery):
     """All episodes differ in the last bits; their outcomes equal the replay."""
     forged.json("seed0/provenance.json", lambda content: content["machine"].update(cpu="another"))
@@ -88,6 +90,7 @@ def foreign(forged: Forgery) -> None:
     forged.table(lambda table: table.assign(trace="0" * 64))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
@@ -102,6 +105,7 @@ def test_another_platform_excuses_no_false_claim(changes: dict[str, Any], why: s
     assert forged.checked().problems == [f"seed0: {why}"]
 
 
+@pytest.mark.slow
 def test_another_platform_excuses_no_false_scores(forged: Forgery):
     foreign(forged)
     forged.json("seed0/result.json", lambda result: result["splits"]["test"]["scores"].reverse())
@@ -119,6 +123,7 @@ def test_mean_returns_agree_on_every_split():
     assert not list(result_check.distant_returns(one, one))
 
 
+@pytest.mark.slow
 def test_another_platform_excuses_no_forged_recording(forged: Forgery):
     """The table has the hash of the forged recording."""
     foreign(forged)
@@ -134,6 +139,7 @@ def test_another_platform_excuses_no_forged_recording(forged: Forgery):
         assert len(forged.checked().problems) == problems
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [{"machine": "x"}, {"git": ["a"]}, {"machine": {"system": "Linux", "cpu": "\ud800", "cores": 1}}, {"more": 1}],

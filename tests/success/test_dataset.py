@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput, NotFound
 
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.storage import tensors
 from dextron_bench.success.dataset import Dataset
 

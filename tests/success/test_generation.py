@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 
 from baselines.floors import Nothing
+from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.splits.rows import Rows
@@ -54,6 +54,7 @@ def test_uniform_blocks_have_only_reaches_of_train_but_new_settings_and_experts(
     assert max(criticals) - min(criticals) > 0.5
 
 
+@pytest.mark.slow
 def test_a_stopped_generation_continues_to_the_same_bytes_with_any_number_of_threads(tmp_path: Path):
     tallies = generate_small(tmp_path / "a", 600)
     generate_small(tmp_path / "b", 100, threads=2)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.success.network import GRID, SIZES, MissingModel, SuccessModel, shipped_model
 from dextron_bench.success.training import initial_network
 

@@ -6,9 +6,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from dextron_bench.errors import BadInput, NotFound
 
 from baselines.floors import Nothing
+from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.storage import shares
 from dextron_bench.storage.pieces import Place
 from dextron_bench.success import generation
@@ -27,6 +27,7 @@ def generate_share(folder: Path, text: str) -> int:
     return int(work_in(folder).play_share(shares.Share.parse(text)).removesuffix(" blocks"))
 
 
+@pytest.mark.slow
 def test_shares_in_any_order_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     tallies = generate_small(tmp_path / "whole", ROWS)
     merged = tmp_path / "merged"
@@ -40,6 +41,7 @@ def test_shares_in_any_order_give_the_same_bytes(tmp_path: Path, monkeypatch: py
     assert file_contents(merged) == file_contents(tmp_path / "whole")  # Blocks that are not needed are gone.
 
 
+@pytest.mark.slow
 def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
     with pytest.raises(NotFound, match="lacks the blocks from 000000 on: the blocks before have 0 of 3000"):
         work_in(tmp_path).check_complete()
@@ -48,6 +50,7 @@ def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
         work_in(tmp_path).check_complete()
 
 
+@pytest.mark.slow
 def test_a_piece_of_another_data_set_is_refused(tmp_path: Path):
     generate_share(tmp_path / "a", "0/1")
     other = generation.DatasetConfig("synthetic", seed=1, block=5, policies=("nothing",))

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.storage import records, tensors
 from dextron_bench.success.network import Fit
 from dextron_bench.success.training import MODEL, STATE, TrainingConfig, train
@@ -27,6 +27,7 @@ def trained(tmp_path: Path) -> Path:
     return tmp_path / "trained"
 
 
+@pytest.mark.slow
 def test_a_stopped_training_ends_with_the_same_bytes(trained: Path, tmp_path: Path):
     write_block(tmp_path / "stopped", 0, [30] * 10, [0, 1] * 5)
 
@@ -40,6 +41,7 @@ def test_a_stopped_training_ends_with_the_same_bytes(trained: Path, tmp_path: Pa
     assert file_contents(tmp_path / "stopped") == file_contents(trained)
 
 
+@pytest.mark.slow
 def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path, tmp_path: Path):
     write_block(tmp_path / "continued", 0, [30] * 10, [0, 1] * 5)
     train(tmp_path / "continued", replace(SHORT, epochs=1))
@@ -49,6 +51,7 @@ def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path,
         train(tmp_path / "continued", replace(SHORT, epochs=1))
 
 
+@pytest.mark.slow
 def test_the_learning_rate_is_halved_every_hundred_epochs(tmp_path: Path, rates: list[float]):
     """Table II; here every two."""
     assert TrainingConfig() == TrainingConfig(batch=1024, learning_rate=1e-3, halved_every=100)
@@ -64,6 +67,7 @@ def test_the_model_keeps_its_learning_curve_and_its_best_epoch(trained: Path):
     assert losses[fit.best_epoch - 1] == min(losses)
 
 
+@pytest.mark.slow
 def test_other_settings_impossible_settings_and_a_model_as_state_are_refused(trained: Path):
     with pytest.raises(BadInput, match="holds another training"):
         train(trained, TrainingConfig(epochs=2, updates=4, batch=8))
@@ -76,6 +80,7 @@ def test_other_settings_impossible_settings_and_a_model_as_state_are_refused(tra
         train(trained, SHORT)
 
 
+@pytest.mark.slow
 def test_the_model_is_from_the_epoch_with_the_lowest_held_out_loss(tmp_path: Path):
     """Outcomes are random and episodes are few, so every epoch makes the predictions on held-out episodes worse."""
     rng = np.random.default_rng(1)
@@ -92,6 +97,7 @@ def test_the_model_is_from_the_epoch_with_the_lowest_held_out_loss(tmp_path: Pat
         np.testing.assert_array_equal(array, best[name])
 
 
+@pytest.mark.slow
 def test_training_learns_an_outcome_that_depends_on_the_state(tmp_path: Path):
     """Success depends on the sign of one number of the state, so the model predicts almost all outcomes correctly."""
     rng = np.random.default_rng(0)

@@ -6,10 +6,10 @@ import json
 
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dextron_bench.errors import BadInput
 from dextron_bench.sweeps import space
 from dextron_bench.sweeps.space import Choices, Range
 

@@ -42,6 +42,7 @@ def _state(lines: list[str], name: str) -> list[str]:
     return [line.split("│")[2].strip() for line in lines if f" {name} " in line]
 
 
+@pytest.mark.slow
 def test_steps_are_missing_then_fresh_and_run_once(checkout: Path, capsys: pytest.CaptureFixture[str]):
     assert states(capsys) == {"first": "missing", "second": "missing"}
     assert rebuild.main([]) == 0
@@ -55,6 +56,7 @@ def test_steps_are_missing_then_fresh_and_run_once(checkout: Path, capsys: pytes
     assert "rebuild:" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_changed_input_output_command_or_physics_makes_a_step_stale(
     checkout: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
@@ -71,6 +73,7 @@ def test_a_changed_input_output_command_or_physics_makes_a_step_stale(
     assert states(capsys) == {"first": "stale", "second": "stale"}
 
 
+@pytest.mark.slow
 def test_a_step_that_fails_stops_the_rebuild_and_stays_missing(
     checkout: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
@@ -90,6 +93,7 @@ def test_elsewhere_and_with_a_wrong_name_one_line_says_what_to_do(
     assert "no step 'nothing'; choose from experts-real" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_every_command_of_every_step_is_one_that_the_command_line_accepts():
     """The words are parsed, not run; patterns stand for a file."""
     assert len({step.name for step in STEPS}) == len(STEPS)

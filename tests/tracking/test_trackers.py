@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from dextron_bench.errors import MissingPackage
 from rerun.chunk import RrdReader
 
+from dextron_bench.errors import MissingPackage
 from dextron_bench.tracking import films, packages, trackers
 from dextron_bench.tracking.follower import Counts, Follower
 from tests.helpers import tracked_training

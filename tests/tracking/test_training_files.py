@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.tracking.training_files import TrainingFiles, training_folders
 from tests.helpers.tiny_training import SEEDS
 from tests.helpers.tracked_training import FOLDER, trained

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods.learners import Trainer, TrainingSetup
 from dextron_bench.splits import strata
 from dextron_bench.storage import tensors

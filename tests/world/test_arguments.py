@@ -44,6 +44,7 @@ def test_a_limit_that_is_no_count_is_refused(limit: Any):
         gymnasium.make_vec(ID, 1, reaches=SOURCE, max_episode_steps=limit)
 
 
+@pytest.mark.slow
 def test_the_limit_of_the_registration_changes_no_episode():
     """At 500, Gymnasium's TimeLimit would also truncate an episode that terminates in that very step."""
 

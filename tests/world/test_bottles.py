@@ -46,6 +46,7 @@ def compiled(bottle: Bottle) -> mujoco.MjModel:
     return loaded
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bottle", [HEAVY, SLIPPERY, WIDE], ids=["heavy", "slippery", "wide"])
 def test_a_bottle_has_the_physics_of_a_model_compiled_with_it(bottle: Bottle, monkeypatch: pytest.MonkeyPatch):
     states = play(Engine(3, threads=1), [HEAVY, bottle, SLIPPERY], 3)

@@ -10,11 +10,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import dextron_bench  # noqa: F401  # Registers the environments.
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.setting import plain
 from dextron_bench.world import task
 from dextron_bench.world.gym import GraspEnv, GraspVectorEnv
@@ -32,6 +32,7 @@ def test_the_registered_environment_passes_gymnasiums_checks_without_a_warning()
         env.step(env.action_space.sample())
 
 
+@pytest.mark.slow
 def test_the_rendered_picture_changes_with_the_state():
     env = GraspEnv(SOURCE, [SETTINGS[3]], render_mode="rgb_array")
     env.reset()

@@ -10,11 +10,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 import dextron_bench  # noqa: F401  # Registers the environments.
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.setting import Setting
 from dextron_bench.world.gym import GraspEnv, GraspVectorEnv
 from tests.helpers.short_reaches import SETTINGS, SOURCE, TORN, TORN_POSE, TornSource, actions, played
@@ -121,6 +121,7 @@ def test_returned_arrays_of_the_vector_environment_do_not_change_later():
     np.testing.assert_array_equal(infos["episode_return"], returns)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mask", [[True, False, True], [False, True, False], [True, True, True]])
 @pytest.mark.parametrize("seed", [None, 4, [5, None, 6]])
 @pytest.mark.parametrize("setting", [None, SETTINGS[1]])
@@ -170,6 +171,7 @@ def test_the_first_reset_begins_an_episode_in_every_slot():
         env.reset(options={"reset_mask": np.array([True, False])})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_the_autoreset_modes_agree_with_gymnasiums(mode: AutoresetMode):
     vector = gymnasium.make_vec(ID, num_envs=3, reaches=SOURCE, autoreset_mode=mode.value)
@@ -207,6 +209,7 @@ def test_a_seed_of_another_form_is_refused_and_changes_nothing(seed: Any):
     assert_same(env.reset(), other.reset())
 
 
+@pytest.mark.slow
 def test_a_copy_of_a_vector_environment_continues_its_episodes(copied: Callable[[Any], Any]):
     env = gymnasium.make_vec(ID, num_envs=2, reaches=SOURCE)
     env.reset(seed=0)

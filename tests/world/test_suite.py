@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import dm_env
 import numpy as np
 import pytest
-from dextron_bench.errors import BadInput
 from dm_control.rl import control
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.sources import UnknownSource
 from dextron_bench.world import model, suite
 from dextron_bench.world.engine import STATE_BOUND
@@ -122,6 +122,7 @@ def test_whole_episodes_are_bit_equal_to_those_of_the_engine():
         assert step.discount == (0.0 if reference.terminated else 1.0)
 
 
+@pytest.mark.slow
 def test_settings_are_played_in_turn_again_and_again():
     env = suite.load(SOURCE, SETTINGS[:2])
     settings = []

@@ -139,6 +139,7 @@ def test_no_episode_is_longer_than_ten_seconds(poses: int):
     assert play(trajectory([0.125] * 600), poses)[1:] == (500, False, True)
 
 
+@pytest.mark.slow
 def test_the_progress_of_episodes_is_independent():
     progress, ids = task.EpisodeState.empty(3), np.array([2, 0])
     progress.begin(ids, states(2), np.array([5, 50]))

@@ -17,7 +17,7 @@ from dextron_bench.leaderboard.page import sections, standings_table
 from dextron_bench.leaderboard.page.rows import PageRow, entries
 from dextron_bench.leaderboard.page.sections import Curves
 from dextron_bench.leaderboard.page.standings_table import Code
-from dextron_bench.splits.loading import SPLIT_NAMES
+from dextron_bench.splits.names import SPLIT_NAMES
 from dextron_bench.splits.tracks import PLUS
 from dextron_bench.web.html import Html, join, style, tag
 from dextron_bench.world import model

@@ -10,7 +10,8 @@ import pandas as pd
 
 from dextron_bench.evaluation.results import Result
 from dextron_bench.splits import strata
-from dextron_bench.splits.loading import EVALUATED, known_splits, load_split
+from dextron_bench.splits.loading import known_splits, load_split
+from dextron_bench.splits.names import EVALUATED
 from dextron_bench.web.html import UNKNOWN, Html, tag
 from dextron_bench.world import task
 

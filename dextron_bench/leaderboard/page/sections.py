@@ -15,7 +15,7 @@ from dextron_bench.leaderboard.highlights import Shown
 from dextron_bench.leaderboard.page import heatmaps as page_heatmaps
 from dextron_bench.leaderboard.page import tracks as page_tracks
 from dextron_bench.scores import cells
-from dextron_bench.splits.loading import EVALUATED
+from dextron_bench.splits.names import EVALUATED
 from dextron_bench.success.exemplars import KINDS
 from dextron_bench.web import svg
 from dextron_bench.web.html import UNKNOWN, Html, join, tag

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -78,7 +79,7 @@ def _row(entry: PageRow, columns: Sequence[Column]) -> Html:
         attributes: dict[str, str | None] = {
             "data_name": column.title,
             "class_": "number" if column.number else None,
-            "data_value": None if value is None or value != value else str(value),
+            "data_value": None if value is None or (isinstance(value, float) and math.isnan(value)) else str(value),
         }
         is_method = column.title == "method"
         row.append(

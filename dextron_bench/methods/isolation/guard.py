@@ -14,11 +14,12 @@ from importlib.abc import MetaPathFinder
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.errors import BadInput
+from dextron_bench.errors import DextronError
 from dextron_bench.methods.isolation import sandbox
 
 PUBLIC = {  # Modules of the benchmark that agents may import, and the modules that these import (docs/agents.md).
     "dextron_bench",
+    "dextron_bench.errors",
     "dextron_bench.experts",
     "dextron_bench.experts.policies",
     "dextron_bench.methods",
@@ -65,7 +66,7 @@ WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 DEVICES = ("/dev/null", "/dev/urandom", "/dev/random", "/proc/cpuinfo", "/proc/meminfo", "/proc/self", "/sys/devices")
 
 
-class NotForAgents(BadInput):
+class NotForAgents(DextronError, PermissionError):
     """An agent tried something that it may not do."""
 
     def __init__(self, action: str) -> None:

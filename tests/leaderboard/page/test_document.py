@@ -251,6 +251,7 @@ def test_only_the_script_of_the_page_may_run(browser: Any, tmp_path: Path):
     opened.close()
 
 
+@pytest.mark.slow
 def test_links_to_recordings_lead_to_shipped_files(browser: Any):
     with visit(browser, ALL) as opened:
         links = opened.eval_on_selector_all("a[href$='.rrd']", "links => links.map(a => a.getAttribute('href'))")
@@ -259,6 +260,7 @@ def test_links_to_recordings_lead_to_shipped_files(browser: Any):
     assert files == set((BOARD.parent / "recordings").glob("*.rrd"))
 
 
+@pytest.mark.slow
 def test_equal_results_make_equal_pages(tmp_path: Path):
     rows = standings.table(map(result, EVIL))
     pages = {leaderboard_page.document(rows, map(result, EVIL), {}, tmp_path, {}) for _ in range(2)}

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import dextron_bench
 from dextron_bench.methods.isolation.guard import PUBLIC
 
@@ -22,12 +24,14 @@ def test_the_docs_list_the_public_names_that_agents_may_import():
     assert modules <= PUBLIC
 
 
+@pytest.mark.slow
 def test_public_modules_import_only_public_modules():
     code = f"import {', '.join(sorted(PUBLIC))}, sys; print(*(m for m in sys.modules if m.startswith('dextron_bench')))"
     imported = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
     assert set(imported) - {"dextron_bench.world.registration"} == PUBLIC  # Every import registers.
 
 
+@pytest.mark.slow
 def test_public_names_that_were_used_before_are_hidden_too():
     code = """
 import dextron_bench

@@ -18,6 +18,7 @@ from tests.helpers.isolated_play import CASES, CLOSES, play
 from tests.helpers.short_reaches import SOURCE
 
 
+@pytest.mark.slow
 def test_an_isolated_agent_acts_as_in_this_process(agent_spec: Callable[[str], str]):
     class Here:
         def reset(self, episodes: np.ndarray) -> None: ...
@@ -34,6 +35,7 @@ def test_an_isolated_agent_acts_as_in_this_process(agent_spec: Callable[[str], s
         assert episode.score == here[index].score
 
 
+@pytest.mark.slow
 def test_installed_methods_play_and_agents_may_print(agent_spec: Callable[[str], str]):
     assert [episode.failure for episode in play("nothing")] == [""] * 3
     assert [episode.failure for episode in play(agent_spec(f"print('hello'); {CLOSES}"))] == [""] * 3
@@ -66,6 +68,7 @@ def test_an_agent_may_import_the_public_names_of_policies(agent_spec: Callable[[
     assert episode.failure == ""
 
 
+@pytest.mark.slow
 def test_an_agent_may_write_in_its_own_folder(agent_spec: Callable[[str], str]):
     act = f"open('note', 'w').write('x'); import os; os.remove('note'); {CLOSES}"
     assert [episode.failure for episode in play(agent_spec(act))] == [""] * 3

@@ -10,8 +10,8 @@ import onnx.helper
 import onnx.numpy_helper
 import pytest
 import torch
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import policy_files, sandbox
 from dextron_bench.methods.isolation.isolated_agent import IsolatedAgent

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from dextron_bench.errors import BadInput
 
+from dextron_bench.errors import BadInput
 from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.recorded.release import MAX_FILE, Manifest
 from dextron_bench.reaches.recorded.release import read as read_release

@@ -74,24 +74,29 @@ def printed(code: str, **environment: str) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 def test_a_process_forked_from_one_that_has_drawn_refuses_to_draw():
     lines = printed(FORK).splitlines()
     assert len(lines) == 2
     assert all("forked from one that has drawn" in line and "'spawn' or 'forkserver'" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_a_process_forked_before_the_first_picture_draws():
     assert printed(FORK_FIRST) == "0"
 
 
+@pytest.mark.slow
 def test_pictures_are_the_same_in_every_thread():
     assert printed(THREADS) == "4 True"
 
 
+@pytest.mark.slow
 def test_two_renderers_draw_in_turn_and_the_end_of_the_process_frees_them():
     assert printed(TURNS) == "True (64, 96, 3)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", ["print('imported')", "1 / 0"])
 def test_triton_is_imported_before_mesas_llvm_and_may_fail(content: str, tmp_path: Path):
     """Mesa's LLVM, then Triton's, which torch's optimizers load, ended a process in a segmentation fault."""
