@@ -6,6 +6,7 @@ process starts is tested in tests/processes.
 
 from __future__ import annotations
 
+import io
 import os
 import pickle
 import signal
@@ -15,7 +16,7 @@ import tempfile
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 from dextron_bench.processes import limited_process, limited_start
 from dextron_bench.processes.limited_process import Outcome
@@ -83,7 +84,7 @@ def _end_with(function: Callable[..., int | None], arguments: Sequence[str]) -> 
 def main() -> None:
     """Answers each question on standard input with an Outcome on standard output."""
     loaded = {target: limited_start._load(target) for target in TARGETS}
-    questions, answers = sys.stdin.buffer, sys.stdout.buffer
+    questions, answers = cast(io.BufferedReader, sys.stdin.buffer), sys.stdout.buffer
     while questions.peek(1):
         folder, target, arguments, content, memory, seconds = pickle.load(questions)
         with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
