@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dextron_bench.storage import folder_config, records, tensors
-from dextron_bench.success.network import Fit
+from dextron_bench.success.fit import Fit
 from dextron_bench.success.training import MODEL, STATE, BadTrainingConfig, TrainingConfig, train
 from tests.success.test_dataset import block_file, write_block
 from tests.success.test_generation import file_contents
