@@ -85,10 +85,10 @@ class Figures:
         from dextron_bench.scores.figures import episodes as drawn_episodes
         from dextron_bench.scores.figures.training import success_curve
         from dextron_bench.splits.loading import load_split
-        from dextron_bench.success import exemplars, network
+        from dextron_bench.success import exemplars, fit, network
 
-        fit = network.training_info(self.reaches)
-        success_curve([structs.asdict(point) for point in fit.curve], self._file("fig4b"))
+        points = [structs.asdict(point) for point in fit.shipped_fit(self.reaches).curve]
+        success_curve(points, self._file("fig4b"))
         yield self._file("fig4b")
         files = [file for file in weights.all_shipped(self.reaches) if file.stem == "seed0"]
         policies = {file.parts[-3]: weights.load_agent_from_file(file) for file in files}

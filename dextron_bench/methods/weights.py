@@ -112,9 +112,9 @@ def maker_of(file: Path) -> tuple[str, Settings]:
     """
     header = tensors.read_about(file)
     method, settings = header.get("method"), header.get("settings")
-    if not isinstance(method, str) or not isinstance(settings, dict):
+    if "method" not in header or not isinstance(settings, dict):
         raise BadInput(f"{file} does not say which method's weights it holds")
-    if method not in registry.installed_methods():
+    if not isinstance(method, str) or method not in registry.installed_methods():
         raise BadInput(
             f"{file} says it holds weights of {method!r}, which is not installed; a file of weights never "
             f"imports code: choose from {', '.join(registry.installed_methods())}, or register it (CONTRIBUTING.md)"

@@ -6,15 +6,12 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import as_file, files
 from importlib.resources.abc import Traversable
-from typing import Annotated
 
 import numpy as np
-from msgspec import Meta
 
 from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.methods.exact import Perceptron, rounded
-from dextron_bench.storage import hashing, records, tensors
-from dextron_bench.storage.records import Count, Number, Record
+from dextron_bench.storage import hashing, tensors
 from dextron_bench.world import model
 
 HIDDEN = 256
@@ -78,46 +75,21 @@ def _check(arrays: Mapping[str, np.ndarray], shapes: Mapping[str, tuple[int, ...
         raise BadInput(f"these arrays are not a success model: they also hold {extra[0]!r}; take a model.safetensors")
 
 
-class FitPoint(Record, frozen=True):
-    """Loss and accuracy after an epoch, on learned and on held-out settings."""
-
-    epoch: Count
-    loss: Number
-    accuracy: Number
-    test_loss: Number
-    test_accuracy: Number
-
-
-class Fit(Record, frozen=True):
-    """What the file of a model says of its training: its settings, rows of data, and learning curve."""
-
-    fit: dict[str, int | float]
-    rows: Count
-    epoch: Count
-    curve: Annotated[list[FitPoint], Meta(min_length=1)]
-    best_epoch: Count
-
-
 @cache
 def shipped_model(reaches: str) -> SuccessModel:
     """The success model that ships for a source of reaches; raises MissingModel."""
-    with as_file(_model_file(reaches)) as file:
+    with as_file(model_file(reaches)) as file:
         return SuccessModel(tensors.read(file))
-
-
-def training_info(reaches: str) -> Fit:
-    """How the model that ships was trained; raises MissingModel."""
-    with as_file(_model_file(reaches)) as file:
-        return records.read_about(file, Fit)
 
 
 def model_digest(reaches: str) -> str:
     """SHA-256, hexadecimal, of the file of the model that ships for a source of reaches; raises MissingModel."""
-    with as_file(_model_file(reaches)) as file:
+    with as_file(model_file(reaches)) as file:
         return hashing.sha256(file)
 
 
-def _model_file(reaches: str) -> Traversable:
+def model_file(reaches: str) -> Traversable:
+    """The file of the model that ships for a source of reaches; raises MissingModel."""
     file = files("dextron_bench") / "data" / f"success-{reaches}.safetensors"
     if not file.is_file():
         raise MissingModel(f"no success model ships for {reaches} reaches; `dextron-bench success train` makes one")

@@ -18,7 +18,8 @@ from dextron_bench.storage import records, tensors
 from dextron_bench.storage.atomic import Json
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.success.dataset import Dataset, read_config
-from dextron_bench.success.network import CLIP, SIZES, Fit, FitPoint, SuccessModel
+from dextron_bench.success.fit import Fit, FitPoint
+from dextron_bench.success.network import CLIP, SIZES, SuccessModel
 
 STATE = "fit.safetensors"  # In the folder of a data set: all that an unfinished training needs to continue.
 MODEL = "model.safetensors"  # In the same folder: the trained model.

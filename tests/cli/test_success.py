@@ -12,7 +12,7 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.storage import records, tensors
 from dextron_bench.success import generation, training
-from dextron_bench.success.network import Fit
+from dextron_bench.success.fit import Fit
 
 
 @pytest.fixture

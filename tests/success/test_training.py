@@ -11,7 +11,7 @@ import pytest
 
 from dextron_bench.errors import BadInput
 from dextron_bench.storage import records, tensors
-from dextron_bench.success.network import Fit
+from dextron_bench.success.fit import Fit
 from dextron_bench.success.training import MODEL, STATE, TrainingConfig, train
 from tests.success.test_dataset import block_file, write_block
 from tests.success.test_generation import file_contents

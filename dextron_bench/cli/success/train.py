@@ -34,7 +34,7 @@ class Train:
 
         from dextron_bench.storage import records
         from dextron_bench.success import training
-        from dextron_bench.success.network import Fit
+        from dextron_bench.success.fit import Fit
 
         folder = folder_of(self.runs, self.reaches, self.data)
         with progress_bar("epochs", self.quiet) as progress:

@@ -12,15 +12,17 @@ import sys
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
-from typing import Any, BinaryIO, TypedDict
+from typing import TYPE_CHECKING, Any, BinaryIO, TypedDict
 
 import numpy as np
 
 from dextron_bench.methods import loading
 from dextron_bench.methods.isolation import guard, policy_files, protocol
-from dextron_bench.methods.settings import Settings
 from dextron_bench.methods.specs import AgentSpec, Kind
 from dextron_bench.storage import tensors
+
+if TYPE_CHECKING:  # The process reads only the files that are imported here.
+    from dextron_bench.methods.settings import Settings
 
 
 class Spec(TypedDict):
