@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
 
+import hypothesis
 import pytest
 
 from dextron_bench.cli import main
@@ -19,6 +20,9 @@ from dextron_bench.reaches.sources import open_source
 from tests.helpers import abilities, forged_bundles, forked_readers, tiny_benchmark, tiny_training
 from tests.helpers.browser import open_browser
 from tests.helpers.small_release import SmallRelease, make_small_release
+
+hypothesis.settings.register_profile("any machine", deadline=None)  # A busy one stalls for a second.
+hypothesis.settings.load_profile("any machine")
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # Each of several test processes would otherwise take every core.
 os.environ.pop("DEXTRON_DEBUG", None)  # With it, an error is a traceback, not one line.

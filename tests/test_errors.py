@@ -29,6 +29,7 @@ def classes() -> Iterator[tuple[str, set[str]]]:
                         yield f"{file.relative_to(ROOT)}:{node.name}", bases
 
 
+@pytest.mark.slow
 def test_no_exception_of_python_has_a_direct_child_that_is_not_a_dextron_error():
     bases_of = dict(classes())
     assert "dextron_bench/errors.py:BadInput" in bases_of

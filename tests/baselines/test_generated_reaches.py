@@ -51,6 +51,7 @@ def test_generated_reaches_are_new_and_arrive_where_the_others_do(generated: tup
     assert not {tuple(reach.positions[0]) for reach in known} & {tuple(reach.positions[0]) for reach in reaches}
 
 
+@pytest.mark.slow
 def test_the_arriving_palm_sees_a_known_offset(generated: tuple[ReachSource, list[Setting]]):
     """All known settings have one offset, 22.4 mm long: it turns with the palm, and its length stays."""
     source, settings = generated

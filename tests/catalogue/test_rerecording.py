@@ -134,6 +134,7 @@ def test_an_episode_that_differs_when_replayed_is_not_recorded(tmp_path: Path, c
     assert not (folder / "recordings").exists()
 
 
+@pytest.mark.slow
 def test_other_physics_and_an_older_split_are_refused(tmp_path: Path):
     folder = play(tmp_path)
     change(folder, digest="0" * 64)

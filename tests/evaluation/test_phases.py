@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import groupby
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dextron_bench.evaluation import diagnosis
@@ -83,7 +83,6 @@ def test_turning_points_by_hand() -> None:
     assert turning_points(np.array([0.2, 0.15, 0.2])) == []
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=60))
 def test_turning_points_alternate_and_the_largest_rise_is_among_their_movements(values: list[float]) -> None:
     closures = np.array(values)
@@ -96,7 +95,6 @@ def test_turning_points_alternate_and_the_largest_rise_is_among_their_movements(
     assert rises == bool(np.any(steps > 0.0))
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=60), st.floats(-1.0, 1.0))
 def test_every_state_has_a_phase_and_only_an_opening_agent_opens(values: list[float], action: float) -> None:
     places = phases(states(values), np.full((len(values) - 1, 1), action))

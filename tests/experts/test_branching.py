@@ -48,6 +48,7 @@ def test_outcomes_differ_between_experts(alone):
     assert scores[0, 1] == 0
 
 
+@pytest.mark.slow
 def test_equal_experts_have_equal_outcomes(alone):
     np.testing.assert_array_equal(alone[0][:, 0], alone[0][:, 3])
 

@@ -15,6 +15,7 @@ from dextron_bench.processes import programs
 PACKAGE = Path(dextron_bench.__file__).parent
 
 
+@pytest.mark.slow
 def test_one_module_alone_makes_the_command_of_a_python_process():
     users = [
         file.relative_to(PACKAGE).as_posix()

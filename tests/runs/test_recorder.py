@@ -86,6 +86,7 @@ def test_a_process_that_was_killed_is_named(tmp_path: Path, two: Recorder):
         write_all(two, tmp_path)
 
 
+@pytest.mark.slow
 def test_an_error_of_the_rollout_ends_all_processes_after_what_they_write(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -77,7 +77,7 @@ def test_worse_means_that_the_whole_interval_is_below_0(lead: float, worse: bool
     assert paired.difference(a, b).is_worse == worse
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(scores(2), scores(3))
 def test_swapping_the_methods_changes_the_sign(a: np.ndarray, b: np.ndarray):
     forward, backward = paired.difference(a, b), paired.difference(b, a)
@@ -86,7 +86,7 @@ def test_swapping_the_methods_changes_the_sign(a: np.ndarray, b: np.ndarray):
     assert forward.low - 1e-9 <= forward.high
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(scores(2), scores(3))
 def test_the_p_value_is_below_5_percent_if_the_interval_excludes_0(a: np.ndarray, b: np.ndarray):
     result = paired.difference(a, b)
@@ -100,7 +100,7 @@ def test_holms_correction_multiplies_the_smallest_p_value_by_their_number():
     assert paired.holm([]) == []
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8))
 def test_holms_correction_keeps_the_order_and_lowers_no_p_value(p_values: list[float]):
     corrected = np.array(paired.holm(p_values))
@@ -139,7 +139,7 @@ def test_both_methods_count_with_the_same_number_of_seeds():
     assert (result.gained.tolist(), result.lost.tolist()) == ([], [])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(arrays(bool, (2, ROWS)), arrays(bool, (3, ROWS)))
 def test_swapping_the_methods_swaps_gained_and_lost(a: np.ndarray, b: np.ndarray):
     forward, backward = paired.flips(a, b), paired.flips(b, a)
@@ -182,14 +182,14 @@ def test_no_methods_have_no_ranks():
     assert paired.ranks([]) == []
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(scores(2), scores(3))
 def test_two_methods_share_a_rank_if_the_interval_holds_0(a: np.ndarray, b: np.ndarray):
     result = paired.difference(a, b)
     assert (paired.ranks([a, b]) == [1, 1]) == (result.low <= 0.0 <= result.high)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(scores(2), min_size=2, max_size=5), st.randoms(use_true_random=False))
 def test_ranks_do_not_depend_on_the_order_of_methods(boards: list[np.ndarray], random):
     order = random.sample(range(len(boards)), len(boards))

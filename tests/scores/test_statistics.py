@@ -74,13 +74,13 @@ def test_one_setting_says_nothing_of_others():
     assert (result.low, result.high) == (0.0, 20.0)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(arrays(float, (3, 8), elements=st.integers(0, 20).map(float)), st.permutations(range(8)))
 def test_the_order_of_settings_and_seeds_changes_no_bit(scores: np.ndarray, order: list[int]):
     assert statistics.estimate(scores) == statistics.estimate(scores[::-1, order])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(0.01, 20.0), st.floats(0.01, 4.0), st.integers(1, 30), st.integers(1, 500))
 def test_the_p_value_is_the_level_at_which_the_interval_ends_at_0(mean: float, ratio: float, few: int, many: int):
     parts = [statistics.Part(mean**2 * ratio, many), statistics.Part(mean**2 * ratio / 3.0, few)]

@@ -167,6 +167,7 @@ def test_a_vector_environment_works_in_gymnasiums_wrappers(mode: str, wrapper: s
     env.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_environment_passes_the_checkers_of_gymnasium_and_stable_baselines(variant: str):
     sb3 = pytest.importorskip("stable_baselines3.common.env_checker")

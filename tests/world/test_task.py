@@ -134,6 +134,7 @@ def test_the_last_pose_is_held_for_twenty_steps():
     assert play(trajectory([0.125] * 600), poses=101)[1:] == (120, False, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("poses", [482, 501, 10_000])
 def test_no_episode_is_longer_than_ten_seconds(poses: int):
     assert play(trajectory([0.125] * 600), poses)[1:] == (500, False, True)

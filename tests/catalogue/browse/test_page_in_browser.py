@@ -26,6 +26,7 @@ def viewer() -> dict[str, tuple[str, bytes]]:
     return web_viewer_files()
 
 
+@pytest.mark.slow
 def test_an_episode_is_searched_and_opened(server: LocalServer, browser: Any):
     complaints, asked = [], []
     page = browser.new_page(viewport={"width": 1400, "height": 900})
@@ -56,6 +57,7 @@ def test_an_episode_is_searched_and_opened(server: LocalServer, browser: Any):
     assert dark >= 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [390, 1400])
 def test_nothing_is_wider_than_the_screen(server: LocalServer, browser: Any, width: int):
     page = browser.new_page(viewport={"width": width, "height": 800})

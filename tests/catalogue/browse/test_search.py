@@ -47,6 +47,7 @@ def test_pages_by_hand():
     assert (Search().pages(many), Search().pages(many[: 2 * SHOWN]), Search().pages(many[:0])) == (3, 2, 1)
 
 
+@pytest.mark.slow
 @given(st.text(max_size=20), st.sampled_from(list(ORDERS)), st.integers(1, 10**6))
 def test_an_address_asks_the_same_again(where: str, order: str, page: int):
     where = where.encode(errors="replace").decode()

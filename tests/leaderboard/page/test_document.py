@@ -89,6 +89,7 @@ def values(page: Any, column: str) -> list[float | None]:
     )
 
 
+@pytest.mark.slow
 def test_every_number_equals_the_published_table(browser: Any, table: Table):
     with visit(browser, ALL) as opened:
         rows = cells(opened)
@@ -108,6 +109,7 @@ def test_every_number_equals_the_published_table(browser: Any, table: Table):
         assert row["seeds"][0] == str(expected["seeds"])
 
 
+@pytest.mark.slow
 def test_endings_equal_the_published_table(browser: Any, table: Table):
     with visit(browser, ALL) as opened:
         parts = opened.eval_on_selector_all(
@@ -125,6 +127,7 @@ def test_endings_equal_the_published_table(browser: Any, table: Table):
             assert lag in (f"{expected['closing_lag']:.2f}", "\N{EN DASH}")
 
 
+@pytest.mark.slow
 def test_heat_maps_average_to_the_success_of_the_row(browser: Any, table: Table):
     with visit(browser, f"{PUBLISHED}#reaches=real&split=test") as opened:
         for heat in opened.locator(".heat:has(tfoot)").locator("visible=true").all():  # Tracks have no settings.
@@ -140,6 +143,7 @@ def test_heat_maps_average_to_the_success_of_the_row(browser: Any, table: Table)
                 assert mean == pytest.approx(table[method, "real", "test"]["success"], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_the_page_starts_with_test_of_real_and_filters(browser: Any, table: Table):
     best = [name for name, *rest in table if rest == ["real", "test"]]
     with visit(browser, PUBLISHED) as opened:
@@ -165,6 +169,7 @@ def test_the_page_starts_with_test_of_real_and_filters(browser: Any, table: Tabl
         assert opened.locator("figure[data-reaches]").locator("visible=true").count() == 1
 
 
+@pytest.mark.slow
 def test_headings_sort_by_click_and_by_key_and_announce_it(browser: Any):
     with visit(browser, PUBLISHED) as opened:
         headings = {name: opened.locator(f"#standings th[scope=col][data-name={name}]") for name in NAMES}
@@ -189,6 +194,7 @@ def test_headings_sort_by_click_and_by_key_and_announce_it(browser: Any):
         assert shown(opened) == sorted(shown(opened), key=str.lower)
 
 
+@pytest.mark.slow
 def test_the_keyboard_reaches_everything(browser: Any):
     with visit(browser, PUBLISHED) as opened:
         reached = []
@@ -205,6 +211,7 @@ def test_the_keyboard_reaches_everything(browser: Any):
         assert unnamed == []
 
 
+@pytest.mark.slow
 def test_the_page_is_readable_without_its_script(browser: Any, table: Table):
     with visit(browser, PUBLISHED, java_script_enabled=False) as opened:
         assert opened.locator("#standings tbody tr").locator("visible=true").count() == len(table) + 1
@@ -212,6 +219,7 @@ def test_the_page_is_readable_without_its_script(browser: Any, table: Table):
         assert opened.locator("figure svg").locator("visible=true").count() == 4
 
 
+@pytest.mark.slow
 def test_each_table_has_a_caption_and_each_picture_a_name(browser: Any):
     with visit(browser, ALL) as opened:
         assert opened.evaluate("[...document.querySelectorAll('table')].every(t => t.caption?.textContent)")
@@ -222,6 +230,7 @@ def test_each_table_has_a_caption_and_each_picture_a_name(browser: Any):
         assert len(ids) == len(set(ids))
 
 
+@pytest.mark.slow
 def test_names_of_strangers_are_text_everywhere(browser: Any, evil: str):
     with visit(browser, f"{evil}#reaches=&split=") as opened:
         opened.on("dialog", lambda dialog: pytest.fail(dialog.message))
@@ -238,6 +247,7 @@ def test_names_of_strangers_are_text_everywhere(browser: Any, evil: str):
         assert rows[0]["privileged"][0] == sorted(EVIL)[0]
 
 
+@pytest.mark.slow
 def test_only_the_script_of_the_page_may_run(browser: Any, tmp_path: Path):
     """The browser would refuse a script in a name that was not escaped."""
     file = tmp_path / leaderboard_page.FILE

@@ -11,6 +11,7 @@ from tests.helpers.browser import visit
 from tests.leaderboard.page.test_document import ALL, PUBLISHED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_has_enough_contrast_in_light_and_dark(browser: Any, scheme: Any):
     with visit(browser, ALL, color_scheme=scheme) as opened:
@@ -63,12 +64,14 @@ def contrast(one: str, other: str) -> float:
     return (bright + 0.05) / (dim + 0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [320, 390, 768, 1280])
 def test_the_page_is_never_wider_than_the_screen(browser: Any, width: int):
     with visit(browser, ALL, viewport={"width": width, "height": 800}) as opened:
         assert opened.evaluate("document.documentElement.scrollWidth") == width
 
 
+@pytest.mark.slow
 def test_print_has_no_controls_and_cuts_nothing_off(browser: Any):
     with visit(browser, PUBLISHED, viewport={"width": 1030, "height": 700}) as opened:
         opened.emulate_media(media="print")

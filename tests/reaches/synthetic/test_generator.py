@@ -88,7 +88,7 @@ def test_reaches_are_plausible(source: generator.SyntheticSource):
         assert reach.positions[-1, 2] > reach.positions[0, 2] + 0.05  # It ends higher than it starts.
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(number=st.integers(0, 1599), noise=st.floats(-2.0, 3.0), x=st.floats(-0.06, 0.06))
 def test_every_path_passes_the_bottle_with_its_offset(number: int, noise: float, x: float):
     reach = generator.generate(number, parameters.shipped_parameters())
