@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import shutil
 from collections.abc import Callable, Generator, Iterator
@@ -88,12 +89,18 @@ def opened(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> C
 
     def opened(reaches: str) -> Source:
         try:
-            return open_source(reaches)
+            return _opened_once(reaches, os.environ.get("DEXTRON_CACHE"), os.environ.get("DEXTRON_DATA"))
         except MissingData:
             monkeypatch.setenv("DEXTRON_DATA", str(request.getfixturevalue("release")))
-            return open_source(reaches)
+            return _opened_once(reaches, os.environ.get("DEXTRON_CACHE"), os.environ["DEXTRON_DATA"])
 
     return opened
+
+
+@functools.cache
+def _opened_once(reaches: str, imported: str | None, release: str | None) -> Source:
+    """A source of reaches; `real` depends on the two variables, and takes seconds to read from a release."""
+    return open_source(reaches)
 
 
 @pytest.fixture

@@ -24,6 +24,7 @@ def test_closing_works_in_the_window_until_the_hand_goes_away():
     assert set(far) == {NO_DECISION}
 
 
+@pytest.mark.slow
 def test_openings_equal_those_with_forks_but_for_their_outcomes():
     cases = [Case(setting, Expert(1.2, 0.3), 2.0) for setting in SETTINGS]
     reported: list[tuple[int, int, str]] = []
@@ -38,6 +39,7 @@ def test_openings_equal_those_with_forks_but_for_their_outcomes():
     assert expert_windows.play(setup, [Case(SETTINGS[0], Expert(1.2, 0.3), 0.0)]) == []  # An empty window.
 
 
+@pytest.mark.slow
 def test_a_training_by_windows_plays_no_forks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(openings, "play", None)
     method = Stopping(labels="windows", settings=3)

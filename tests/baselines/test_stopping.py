@@ -30,6 +30,7 @@ def played() -> Openings:
     return openings.joined(openings.play(SOURCE, SETTINGS, threads=1))
 
 
+@pytest.mark.slow
 def test_openings_are_kept_by_reach_and_a_damaged_file_is_named(
     played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -187,6 +188,7 @@ def trainer(tmp_path: Path, played: Openings) -> Callable[..., stopping_trainer.
     return make
 
 
+@pytest.mark.slow
 def test_training_learns_to_close_where_closing_succeeds(
     trainer: Callable[..., stopping_trainer.StoppingTrainer], played: Openings
 ):
@@ -199,6 +201,7 @@ def test_training_learns_to_close_where_closing_succeeds(
     assert scores == [task.SUCCESS] * len(solvable)
 
 
+@pytest.mark.slow
 def test_it_learns_from_what_closing_can_solve_on_generated_reaches_too(
     played: Openings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

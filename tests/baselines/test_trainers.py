@@ -23,7 +23,8 @@ from tests.helpers.short_reaches import SETTINGS, SOURCE
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 FRAMES = 40  # Of an epoch.
 SCHEDULE = Schedule(epochs=4, warm_start=30, period=1)
-KINDS = ("rl", "held", "rlil", "rlpd", "bc", "dagger", "stopping")
+QUICK = ("rl", "held", "rlil", "bc", "dagger")
+KINDS = (*QUICK, *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("rlpd", "stopping")))
 
 
 @pytest.fixture(autouse=True)

@@ -39,6 +39,7 @@ def test_a_training_ends_with_the_same_bytes(training_world: Path, names: tuple[
     assert not list(Path("runs").rglob(LOCK))
 
 
+@pytest.mark.slow
 def test_a_training_where_nothing_can_be_locked_says_so_in_one_line(training_world: Path):
     environment = conditions.environment("no_flock", "no_exclusive")
     code, printed = finish(tiny_benchmark.start(training_world / "data", *TRAIN, **environment))
@@ -46,6 +47,7 @@ def test_a_training_where_nothing_can_be_locked_says_so_in_one_line(training_wor
     assert "let no other process work in the same folder" in printed
 
 
+@pytest.mark.slow
 def test_a_training_in_a_folder_whose_holder_is_elsewhere_says_which_file_to_remove(training_world: Path):
     assert main.main([*TRAIN]) == 0
     lock = next(Path("runs").glob("*/synthetic/training-*")) / LOCK
@@ -57,6 +59,7 @@ def test_a_training_in_a_folder_whose_holder_is_elsewhere_says_which_file_to_rem
     assert "if that process has ended, remove the lock file" in printed
 
 
+@pytest.mark.slow
 def test_a_user_without_a_name_learns_where_imported_data_can_go(tmp_path: Path):
     for words in (["data", "info", "--reaches", "real"], ["data", "import", "--from", "~/release.zip"]):
         process = tiny_benchmark.start(tmp_path, *words, **conditions.environment("no_name"))

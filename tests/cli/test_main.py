@@ -137,6 +137,7 @@ def test_help_and_the_package_itself_import_nothing_heavy():
     assert not HEAVY & set(loaded.split())
 
 
+@pytest.mark.slow
 def test_products_of_numpy_and_torch_use_one_thread_by_default():
     script = (
         "from dextron_bench.cli.main import main; main(['--version']); import numpy, threadpoolctl, torch; "

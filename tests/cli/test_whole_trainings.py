@@ -26,6 +26,7 @@ def here(training_world: Path) -> Path:
     return training_world
 
 
+@pytest.mark.slow
 def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("baselines.cycle.FRAMES", 60)
     monkeypatch.setattr("baselines.bc.STEPS", 5)

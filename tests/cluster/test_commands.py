@@ -102,6 +102,7 @@ def test_a_submission_is_the_same_bundle(here: Path, complaint: Callable[..., st
     assert "exec:true lies on this machine alone: use --share on machines that have it" in text
 
 
+@pytest.mark.slow
 def test_a_board_is_verified_as_without_a_cluster(here: Path, capsys: pytest.CaptureFixture[str]):
     for method in ("exp", "nothing"):
         play("run", "--method", method, "--quiet", "--record", "0")
@@ -117,6 +118,7 @@ def test_a_board_is_verified_as_without_a_cluster(here: Path, capsys: pytest.Cap
     assert capsys.readouterr().out == printed
 
 
+@pytest.mark.slow
 def test_a_sweep_has_the_same_trials_and_goes_on_without_those_that_fail(here: Path):
     """One of three trainings raises an error; of three distances, the agent raises one at one, and refuses one."""
     (here / "mine.py").write_text(AGENT)

@@ -131,6 +131,7 @@ def test_a_failed_export_raises_and_leaves_nothing(tmp_path: Path, monkeypatch: 
         write(tmp_path / "b", [STILL])
 
 
+@pytest.mark.slow
 def test_a_policy_learned_from_the_data_set_beats_the_mean_action_on_other_episodes(tmp_path: Path):
     rng = np.random.default_rng(0)
     cases = tuple(Case(SOURCE.sample(rng), Expert(1.2, 0.4), 0.0) for _ in range(20))

@@ -73,6 +73,7 @@ def test_a_block_depends_only_on_its_number_and_the_seed():
     assert not first.equals(montecarlo.draw(SOURCE, Search("brief", 4, 3, 4), 7))
 
 
+@pytest.mark.slow
 def test_rows_are_the_same_at_any_slots_and_threads_and_after_interruptions(tmp_path):
     whole = search(tmp_path / "whole", rows=2)
     assert (whole["score"] == 20).sum() >= 2
@@ -142,6 +143,7 @@ def test_two_machines_are_named_in_the_summary(tmp_path: Path, monkeypatch: pyte
     assert [makers["machine"]["cpu"], *(maker["machine"]["cpu"] for maker in makers["others"])] == ["large", "small"]
 
 
+@pytest.mark.slow
 def test_outcomes_equal_the_outcomes_of_experts_played_one_by_one(tmp_path):
     table = search(tmp_path, rows=1)
     agents = [policies.Expert(gain, critical) for gain, critical in zip(table["gain"], table["critical"], strict=True)]

@@ -38,6 +38,7 @@ def played() -> Openings:
     return openings.joined(openings.play(SOURCE, SETTINGS, threads=1))
 
 
+@pytest.mark.slow
 def test_an_outcome_is_the_end_of_an_episode_that_closes_there(played: Openings):
     """All decisions that were tried are played again, each from its start by an agent that closes at that step."""
     for number in (0, 1):

@@ -66,6 +66,7 @@ def test_all_baselines_play_one_draw_and_it_is_kept(board: Path, drawn: list[str
     assert drawn == ["test", "unseen-reach"] * 3
 
 
+@pytest.mark.slow
 def test_fresh_scores_of_baselines_are_verified(board: Path, drawn: list[str], capsys: pytest.CaptureFixture[str]):
     assert main.main(words("--beacon", "a")) == 0
     assert main.main(verification("--redraw")) == 0

@@ -45,6 +45,7 @@ def test_rows_play_each_track_once_and_keep_it(board: Path, capsys: pytest.Captu
     assert json.loads((board / RESULT).read_text())["splits"] == splits  # The same run, published again, loses none.
 
 
+@pytest.mark.slow
 def test_scores_under_tracks_are_verified(board: Path, capsys: pytest.CaptureFixture[str]):
     assert main.main(words("--track", "delay-300")) == 0
     verification = ["leaderboard", "verify", "--all", "--board", "board", "--quiet"]
@@ -57,6 +58,7 @@ def test_scores_under_tracks_are_verified(board: Path, capsys: pytest.CaptureFix
     assert "test+delay-300 row 0: says return 7" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_sources_without_rows_are_left_out(board: Path, capsys: pytest.CaptureFixture[str]):
     assert main.main(["leaderboard", "tracks", "--track", "delay-100", "--board", "board", "--quiet"]) == 0
     assert "reflex, synthetic reaches, seed 0: 1 of 1 tracks" in capsys.readouterr().out

@@ -54,6 +54,7 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     assert "table.csv differs" in printed
 
 
+@pytest.mark.slow
 def test_missing_and_additional_seeds_on_the_board_are_problems(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
@@ -107,6 +108,7 @@ def test_view_records_any_episode_of_a_bundle(
     assert sorted(path.name for path in (tmp_path / "runs/submissions/.bundles").iterdir()) == [Path(file).parts[3]]
 
 
+@pytest.mark.slow
 def test_baselines_on_a_board_are_run_again(submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """Actions of `random` depend on which rows are played together, so the verifier plays all its rows."""
     runs, board = str(tmp_path / "runs"), tmp_path / "board"

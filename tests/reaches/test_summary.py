@@ -34,6 +34,7 @@ def test_means_are_taken_over_the_reaches_of_each_group():
     np.testing.assert_allclose(means["length"], [0.2, 0.8])
 
 
+@pytest.mark.slow
 def test_minjerk_reaches_last_as_long_as_their_episodes():
     table = reach_table(MinjerkSource())
     np.testing.assert_allclose(table["duration"], 416 * 0.02)

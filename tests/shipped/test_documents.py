@@ -59,6 +59,7 @@ def test_a_renamed_function_is_noticed():
     assert list(missing_names(ast.parse(code))) == ["dextron_bench.rollouts", "diagnosis.table"]
 
 
+@pytest.mark.slow
 def test_numbers_in_the_documents_are_those_of_the_data(tmp_path: Path):
     """The same files as `dextron-bench rebuild` fills; at least the two pages with most numbers have some."""
     files = [file for pattern in DOCUMENTS for file in sorted(ROOT.glob(pattern))]

@@ -48,6 +48,7 @@ def test_experts_solve_every_row_of_the_splits_that_can_be_solved(file: Path):
         assert split_name == "open" or set(split["scores"]) == {20.0}
 
 
+@pytest.mark.slow
 def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
     rebuilt = tmp_path / "board"
     shutil.copytree(BOARD, rebuilt)

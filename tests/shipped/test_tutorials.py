@@ -30,6 +30,7 @@ def training_setup(tmp_path: Path) -> TrainingSetup:
     return TrainingSetup(open_source("minjerk"), load_split("minjerk", "val").cases[:4], tmp_path, threads=1)
 
 
+@pytest.mark.slow
 def test_a_resumed_training_equals_an_unbroken_one(search: ModuleType, training_setup: TrainingSetup):
     method = search.Search(preset="smoke", candidates=4, episodes=1)
     unbroken, first, second = (method.trainer(training_setup, [0]) for _ in range(3))

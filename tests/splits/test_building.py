@@ -136,6 +136,7 @@ def test_unsolved_minjerk_reaches_are_skipped(monkeypatch):
         building_minjerk.first_solved(MinjerkSource(), np.arange(4), 1, Engine(4, 1), batch=2)
 
 
+@pytest.mark.slow
 def test_writing_minjerk_keeps_the_other_sources(tmp_path):
     (tmp_path / "splits.json").write_text('{"real": {}}')
     entry = building_minjerk.build(tmp_path, Engine(8, 1), 0, FEW)

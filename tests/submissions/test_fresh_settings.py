@@ -92,6 +92,7 @@ def findings(board: Path, redraw: bool) -> list[str]:
     return [p for row in verify_board.rows(board) for p in verify_board.check(row, board, redraw=redraw).problems]
 
 
+@pytest.mark.slow
 def test_fresh_scores_of_the_board_are_verified(board: Path):
     assert findings(board, redraw=True) == []
     file = board / "results/near/synthetic/seed0/result.json"

@@ -25,6 +25,7 @@ def test_a_valid_submission_is_replayed_bit_for_bit_and_its_agent_run_again(subm
     assert verdict.results[0]["splits"]["test"]["scores"] == [20.0, 20.0, 0.0]
 
 
+@pytest.mark.slow
 def test_without_a_sandbox_the_agent_runs_only_if_it_is_trusted_and_its_tier_stays_replayed(
     forged: Forgery, monkeypatch: pytest.MonkeyPatch
 ):

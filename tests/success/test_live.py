@@ -79,6 +79,7 @@ def test_a_closed_viewer_is_an_error_before_the_next_episode(monkeypatch: pytest
             wait()
 
 
+@pytest.mark.slow
 def test_the_live_view_draws_all_steps(tmp_path: Path):
     file, episode = tmp_path / "live.rrd", rolled_out()
     view = recording.LiveView(lambda stream: stream.save(file), "live", SOURCE.path(CASE.setting), {"method": "exp"})

@@ -22,6 +22,7 @@ def generate_share(folder: Path, text: str) -> int:
     return sharing.generate_share(SOURCE, TRAIN, SMALL, folder, ROWS, agents, share, threads=1)
 
 
+@pytest.mark.slow
 def test_shares_in_any_order_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     tallies = generate_small(tmp_path / "whole", ROWS)
     merged = tmp_path / "merged"

@@ -90,6 +90,7 @@ def test_elsewhere_and_with_a_wrong_name_one_line_says_what_to_do(
     assert "no step 'nothing'; choose from experts-real" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_every_command_of_every_step_is_one_that_the_command_line_accepts():
     """The words are parsed, not run; patterns stand for a file."""
     assert len({step.name for step in STEPS}) == len(STEPS)

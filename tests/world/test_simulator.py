@@ -67,6 +67,7 @@ def test_an_error_that_has_nothing_to_do_with_graphics_is_raised():
         simulator.load("no_such_module")
 
 
+@pytest.mark.slow
 def test_without_dm_control_one_line_says_how_to_add_it(tmp_path: Path):
     (tmp_path / "dm_control.py").write_text("raise ModuleNotFoundError('gone', name='dm_control')")
     code = """

@@ -254,6 +254,7 @@ def test_links_to_recordings_lead_to_shipped_files(browser: Any):
     assert files == set((BOARD.parent / "recordings").glob("*.rrd"))
 
 
+@pytest.mark.slow
 def test_equal_results_make_equal_pages(tmp_path: Path):
     rows = standings.table(map(result, EVIL))
     pages = {leaderboard_page.document(rows, map(result, EVIL), {}, tmp_path, {}) for _ in range(2)}

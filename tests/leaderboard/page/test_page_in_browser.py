@@ -85,6 +85,7 @@ def test_a_part_that_goes_on_to_the_right_fades_there_until_it_is_scrolled_to_it
         assert standings.evaluate("part => getComputedStyle(part).maskImage") == "none"
 
 
+@pytest.mark.slow
 def test_on_a_phone_the_legend_stays_while_its_tables_scroll_by(browser: Any):
     with visit(browser, PUBLISHED, viewport={"width": 390, "height": 800}) as opened:
         opened.evaluate("document.querySelector('.legend').scrollIntoView(); scrollBy(0, 150)")

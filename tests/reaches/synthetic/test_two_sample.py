@@ -90,6 +90,7 @@ def test_features_have_one_finite_row_for_each_reach(reaches: list[Reach]):
         assert np.isfinite(values).all()
 
 
+@pytest.mark.slow
 def test_equal_samples_have_an_auc_near_one_half(reaches: list[Reach], few_trees: None):
     table = two_sample.auc_table(reaches[:48], reaches[48:], 0)
     whole = table[table.stratum == "all"]
@@ -99,6 +100,7 @@ def test_equal_samples_have_an_auc_near_one_half(reaches: list[Reach], few_trees
     assert (whole.auc <= whole.high).all()
 
 
+@pytest.mark.slow
 def test_a_difference_in_duration_shows_in_the_durations_alone(reaches: list[Reach], few_trees: None):
     slower = [replace(r, times=r.times * 1.5, reached=r.reached * 1.5) for r in reaches[48:]]
     table = two_sample.auc_table(reaches[:48], slower, 0).set_index(["group", "classifier", "stratum"]).auc

@@ -84,6 +84,7 @@ def test_a_process_forked_before_the_first_picture_draws():
     assert printed(FORK_FIRST) == "0"
 
 
+@pytest.mark.slow
 def test_pictures_are_the_same_in_every_thread():
     assert printed(THREADS) == "4 True"
 
@@ -92,6 +93,7 @@ def test_two_renderers_draw_in_turn_and_the_end_of_the_process_frees_them():
     assert printed(TURNS) == "True (64, 96, 3)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", ["print('imported')", "1 / 0"])
 def test_triton_is_imported_before_mesas_llvm_and_may_fail(content: str, tmp_path: Path):
     """Mesa's LLVM, then Triton's, which torch's optimizers load, ended a process in a segmentation fault."""
