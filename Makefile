@@ -5,6 +5,7 @@ VENV ?= .venv
 PYTHON ?= $(VENV)/bin/python
 METHOD ?= exp
 REACHES ?= synthetic
+SPLIT ?= test
 ARGS ?=
 
 # PyTorch's own index has a CPU build. PyPI's build for Linux needs gigabytes of CUDA, which only a GPU makes use of.
@@ -45,7 +46,7 @@ $(VENV)/.development: $(VENV)/.runtime
 	@touch $@
 
 run: $(RUNTIME)
-	$(PYTHON) -m dextron_bench run --method $(METHOD) --reaches $(REACHES) $(ARGS)
+	$(PYTHON) -m dextron_bench run --method $(METHOD) --reaches $(REACHES) --split $(SPLIT) $(ARGS)
 
 test: $(DEVELOPMENT)
 	$(PYTHON) -m pytest -q -n 2 $(ARGS)

@@ -9,7 +9,7 @@ from baselines.rl import Rl
 from baselines.sac import BATCH
 
 
-class BadShare(ValueError):
+class BadRatio(ValueError):
     """A demo-use ratio outside [0, 1]."""
 
 
@@ -25,7 +25,7 @@ class Rlil(Rl):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0.0 <= self.dur <= 1.0:
-            raise BadShare(f"--dur is {self.dur:g}; a demo-use ratio lies between 0 and 1")
+            raise BadRatio(f"--dur is {self.dur:g}; a demo-use ratio lies between 0 and 1")
 
     @property
     def method_stem(self) -> str:

@@ -117,9 +117,9 @@ def rates(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     used: list[float] = []
 
     class Watched(torch.optim.Adam):
-        def step(self, *arguments: Any) -> Any:
+        def step(self, closure: Any = None) -> Any:
             used.append(self.param_groups[0]["lr"])
-            return super().step(*arguments)
+            return super().step(closure)
 
     monkeypatch.setattr(torch.optim, "Adam", Watched)
     return used

@@ -74,7 +74,7 @@ def test_the_wheel_runs_without_the_checkout(wheel: Path, tmp_path: Path):
     place = run("-c", "import dextron_bench; print(dextron_bench.__file__)", folder=elsewhere, environment=environment)
     assert Path(place.strip()).is_relative_to(installed)
     dextron_bench = ("-m", "dextron_bench")
-    assert "reflex" in run(*dextron_bench, "list", folder=elsewhere, environment=environment)
+    assert "reflex" in run(*dextron_bench, "runs", "methods", folder=elsewhere, environment=environment)
     words = ("run", "--method", "nothing", "--split", "val", "--record", "0", "--quiet")
     assert "nothing" in run(*dextron_bench, *words, folder=elsewhere, environment=environment)
     assert (elsewhere / "runs/nothing/synthetic/seed0/result.json").exists()

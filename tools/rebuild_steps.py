@@ -30,13 +30,13 @@ class Step:
 def _search(reaches: str, rows: int) -> Step:
     database = f"mc/{reaches}/seed0/experts-{reaches}"
     copies = tuple((database + end, f"{DATA}/experts-{reaches}{end}") for end in (".parquet", ".json"))
-    command = f"mc --reaches {reaches} --rows {rows} --seed 0 --runs {{runs}}"
+    command = f"data mc --reaches {reaches} --rows {rows} --seed 0 --runs {{runs}}"
     return Step(f"experts-{reaches}", (command,), copies=copies)
 
 
 def _splits(reaches: str) -> Step:
     """The splits of a source; the catalogue is rewritten by every source, so it is no part of what a step makes."""
-    command, needs = f"splits --reaches {reaches} --into {DATA}", ()
+    command, needs = f"data splits --reaches {reaches} --into {DATA}", ()
     if reaches != "minjerk":
         database = f"{DATA}/experts-{reaches}.parquet"
         command, needs = (
@@ -48,7 +48,7 @@ def _splits(reaches: str) -> Step:
 
 def _bottles(reaches: str) -> Step:
     """The splits under the tracks that change the bottle."""
-    command = f"splits --reaches {reaches} --bottles --into {DATA} --runs {{runs}}"
+    command = f"data splits --reaches {reaches} --bottles --into {DATA} --runs {{runs}}"
     return Step(
         f"bottles-{reaches}",
         (command,),
@@ -86,7 +86,7 @@ LEARNERS = {  # By label: the flags of the method.
     "rlil-0.3": "rlil --dur 0.3",
 }
 TENTH = {f"{method}-tenth": f"{method} --preset tenth" for method in ("rlpd", "dagger")}  # By label: their flags.
-SHOWN = {  # By label: the flags of the learners with recordings that ship, besides SOR and SIM.
+SHOWN = {  # By label: the flags of the learners whose episodes may become recordings that ship, besides SOR.
     **{label: LEARNERS[label] for label in ("bc", "rl-hold40", "rlil-0.1", "rlil-0.3")},
     **TENTH,
     "stopping": "stopping",
@@ -107,8 +107,8 @@ def _success(reaches: str, rows: int, epochs: int, labels: tuple[str, ...]) -> S
     return Step(f"success-{reaches}", (data, train), (f"{DATA}/splits-{reaches}.parquet", *policies), copies=copies)
 
 
-def _show(method: str, reaches: str = "synthetic") -> str:
-    return f"eval --method {method} --reaches {reaches} --seed 0 --split test --runs {{runs}}/show"
+def _show(method: str) -> str:
+    return f"eval --method {method} --reaches synthetic --seed 0 --split test --runs {{runs}}/show"
 
 
 STEPS: tuple[Step, ...] = (
@@ -144,8 +144,7 @@ STEPS: tuple[Step, ...] = (
         (
             "run --method exp --split test --runs {runs}/show",
             *map(_show, (*SHOWN.values(), "sor")),
-            _show("sim", "minjerk"),
-            "recordings choose --runs {runs}/show --into recordings",
+            "recordings choose --runs {runs}/show --method exp rlil-0.1 sor stopping --into recordings",
         ),
         needs=(
             *(SPLITS, f"{DATA}/success-synthetic.safetensors", SIM),

@@ -46,6 +46,11 @@ def matches(table: pd.DataFrame, text: str) -> np.ndarray:
         raise BadExpression("the expression is nested too deeply") from None
 
 
+def filtered(table: pd.DataFrame, text: str, columns: Iterable[str]) -> pd.DataFrame:
+    """The rows of a table for which an expression over its `columns` is true; raises BadExpression."""
+    return table[matches(table[[name for name in columns if name in table]], text)] if text.strip() else table
+
+
 def _parse(text: str) -> ast.expr:
     if len(text) > LONGEST:
         raise BadExpression(f"the expression has {len(text)} characters; {LONGEST} are allowed")

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from dextron_bench import recording
-from dextron_bench.catalogue import selection
+from dextron_bench.catalogue import episodes
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches import sources
@@ -32,17 +32,18 @@ class Unplayable(ValueError):
 def rerecord(table: pd.DataFrame, report: Progress = no_progress) -> list[Path]:
     """The recordings of selected episodes, in order; makes recordings that are missing, damaged or of another episode.
 
-    Raises Unplayable, UnwritableRecording, MissingData, UnknownSplit.
+    Raises Unplayable, UnwritableRecording, MissingData, UnknownSplit, and the errors of `episodes.with_actions`.
     """
+    table = episodes.with_actions(table)
     rows = table.to_dict("records")
-    files = [RunFolder(Path(row["folder"])).recording(row["split"], row["row"]) for row in rows]
+    files = [RunFolder(Path(row["run"])).recording(row["split"], row["row"]) for row in rows]
     faults = _faults(files, rows)
     for row, fault in zip(rows, faults, strict=True):
         if fault:
             _check_playable(row, fault)
     to_make = table[[bool(fault) for fault in faults]]
     done = 0
-    for _, group in to_make.groupby(["folder", "split"], sort=False):
+    for _, group in to_make.groupby(["run", "split"], sort=False):
         for _ in _record(group):
             done += 1
             report(done, len(to_make))
@@ -58,14 +59,14 @@ def _faults(files: Sequence[Path], rows: Sequence[dict[Any, Any]]) -> list[str]:
 def _fault(summary: recording.Summary, row: dict[Any, Any]) -> str:
     if summary.damage:
         return summary.damage
-    expected = {"split_digest": row["digest"], "episode_return": row["score"], "steps": row["length"]}
+    expected = {"split_digest": row["digest"], "episode_return": row["return"], "steps": row["steps"]}
     differing = [name for name, value in expected.items() if summary.properties.get(name) != value]
     return f"is of an episode with another {differing[0].replace('_', ' ')}" if differing else ""
 
 
 def _check_playable(row: dict[Any, Any], fault: str) -> None:
     """Raises Unplayable if nothing is left to make a recording from."""
-    run = RunFolder(Path(row["folder"]))
+    run = RunFolder(Path(row["run"]))
     name, advice = f"{row['split']} row {row['row']} of {run.path}", "run the command that made the run again"
     if not hasattr(row.get("actions"), "__len__"):
         problem = "has no recording" if fault == MISSING else f"has a recording that {fault}"
@@ -89,13 +90,13 @@ def _physics(run: RunFolder) -> str:
 def _record(group: pd.DataFrame) -> Iterator[None]:
     """Plays the episodes of one run on one split again, and records them; yields after each."""
     rows = group.to_dict("records")
-    run, reaches = RunFolder(Path(rows[0]["folder"])), rows[0]["reaches"]
+    run, reaches = RunFolder(Path(rows[0]["run"])), rows[0]["reaches"]
     source, split = sources.open_source(reaches), load_split(reaches, rows[0]["split"])
-    about, settings = selection.run_identity(run), from_frame(group)
+    about, settings = episodes.run_identity(run), from_frame(group)
     for place, episode in replay(source, split.rows(row["row"] for row in rows), group["actions"].tolist()):
         row = rows[place]
         if episode.setting != settings[place]:
-            raise Unplayable(f"{row['split']} row {row['row']} of {row['folder']} is no setting of this split")
+            raise Unplayable(f"{row['split']} row {row['row']} of {row['run']} is no setting of this split")
         recording_files.record(run, source, split, row["row"], _as_recorded(row, episode), about)
         yield
 
@@ -103,10 +104,10 @@ def _record(group: pd.DataFrame) -> Iterator[None]:
 def _as_recorded(row: dict[Any, Any], episode: Episode) -> Episode:
     """The episode with the failure in its row; raises Unplayable if the replay differs from the row."""
     episode = replace(episode, failure=row["failure"]) if row["failure"] and episode.failure else episode
-    if (episode.score, len(episode.actions), episode.failure) != (row["score"], row["length"], row["failure"]):
+    if (episode.score, len(episode.actions), episode.failure) != (row["return"], row["steps"], row["failure"]):
         raise Unplayable(
-            f"{row['split']} row {row['row']} of {row['folder']} differs when it is played again: return "
-            f"{episode.score:g} after {len(episode.actions)} steps, not {row['score']:g} after {row['length']}; "
+            f"{row['split']} row {row['row']} of {row['run']} differs when it is played again: return "
+            f"{episode.score:g} after {len(episode.actions)} steps, not {row['return']:g} after {row['steps']}; "
             "play it on the machine and with the versions that its provenance.json names"
         )
     return episode

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from dextron_bench.catalogue.run_catalogue import Entry
 
 SCORES = ("return", "success")
 VAL = "val"  # Orders by the mean return on the split of this name, whatever the split is.
 ORDERS = ("name", "date", VAL, *SCORES)
-NEVER = datetime.min.replace(tzinfo=UTC)  # The date, in the order, of a run that says none.
 STATES = ("done", "training", "playing", "stopped", "unfinished", "failed")  # The first words of states.
 
 
@@ -39,6 +39,8 @@ class RunFilter:
     """A date, such as 2026-01-31: only runs that ended, or began, since."""
     state: str = ""
     """The beginning of a state: done, training, playing, stopped, unfinished, failed."""
+    where: str = ""
+    """An expression, such as "val > 15 and near < 0.1"; docs/runs.md lists the columns."""
 
     def __post_init__(self) -> None:
         for text in self.setting:
@@ -62,21 +64,25 @@ class RunFilter:
         )
 
 
+def matching(entries: Iterable[Entry], run_filter: RunFilter, split: str) -> list[Entry]:
+    """The entries that a filter selects; `split` is the split of the scores. Raises BadExpression."""
+    from dextron_bench.catalogue import expressions  # Loads pandas, which the flags of commands do not need.
+
+    passing = [entry for entry in entries if run_filter.passes(entry)]
+    table = _table(passing, split)
+    return [passing[place] for place in expressions.filtered(table, run_filter.where, map(str, table)).index]
+
+
 def ordered(entries: Iterable[Entry], order: str, split: str) -> list[Entry]:
     """Entries by name, with the newest first by "date", with the highest score on a split first by "return", "success".
 
     By "val" the highest mean return on `val` comes first. Entries without the score come last. Raises BadSearch.
     """
-    known = sorted(entries, key=lambda entry: (entry.label, entry.reaches))
-    if order == "name":
-        return known
-    if order == "date":
-        return sorted(known, key=lambda entry: entry.changed or NEVER, reverse=True)
-    if order == VAL:
-        return sorted(known, key=lambda entry: _last_if_nan(entry.score(VAL)))
-    if order not in SCORES:
+    if order not in ORDERS:
         raise BadSearch(f"--sort {order!r}: choose from {', '.join(ORDERS)}")
-    return sorted(known, key=lambda entry: _last_if_nan(entry.score(split, order)))
+    known = sorted(entries, key=lambda entry: (entry.label, entry.reaches))
+    table = _table(known, split)
+    return [known[place] for place in table.sort_values(order, ascending=order == "name", kind="stable").index]
 
 
 def check_split(entries: Sequence[Entry], split: str) -> None:
@@ -94,8 +100,33 @@ def differing_settings(entries: Sequence[Entry]) -> list[str]:
     return differing + [name for name, values in others.items() if len(set(map(repr, values))) > 1]
 
 
-def _last_if_nan(score: float) -> float:
-    return math.inf if math.isnan(score) else -score
+def _table(entries: Sequence[Entry], split: str) -> pd.DataFrame:
+    """A row for each entry: what `runs list` shows of it, and its settings; the index is its place."""
+    import pandas as pd
+
+    rows = [
+        {
+            **{"name": entry.label, "reaches": entry.reaches, "state": entry.state, "seeds": len(entry.seeds)},
+            **{VAL: entry.score(VAL), **{what: entry.score(split, what) for what in SCORES}},
+            **{"date": entry.changed.astimezone(UTC).isoformat() if entry.changed else ""},
+            **{"tags": " ".join(entry.tags), "note": entry.note, "physics": entry.physics},
+        }
+        for entry in entries
+    ]
+    columns = ("name", "reaches", "state", "seeds", VAL, *SCORES, "date", "tags", "note", "physics")
+    settings = dict.fromkeys(name for entry in entries for name in entry.settings if name not in columns)
+    values = {name: _of_one_kind([entry.settings.get(name) for entry in entries]) for name in settings}
+    return pd.DataFrame(rows, columns=columns).assign(**values)
+
+
+def _of_one_kind(values: Sequence[Any]) -> list[Any]:
+    """The values of a setting as True and False, as numbers (NaN if missing), or as texts (empty if missing)."""
+    known = [value for value in values if value is not None]
+    if len(known) == len(values) and all(isinstance(value, bool) for value in known):
+        return list(values)
+    if known and all(isinstance(value, int | float) and not isinstance(value, bool) for value in known):
+        return [float("nan") if value is None else float(value) for value in values]
+    return ["" if value is None else str(value) for value in values]
 
 
 def _equal(value: object, text: str) -> bool:

@@ -1,25 +1,21 @@
-"""Selects episodes to view: all recordings at a place, or episodes from the tables of runs."""
+"""Selects episodes to view: all recordings at a place, or rows of the table of episodes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
+from dextron_bench.catalogue import expressions
+from dextron_bench.catalogue.episodes import COLUMNS, NoEpisodes
 from dextron_bench.evaluation.diagnosis import CAUSES
-from dextron_bench.runs import recording_files, result_files, run_files
-from dextron_bench.storage import atomic, schemas
+from dextron_bench.runs import recording_files
 from dextron_bench.storage.folders import visible
-from dextron_bench.storage.run_folder import TRACKING, RunFolder, below
+from dextron_bench.storage.run_folder import TRACKING, RunFolder
 
 LIMIT = 5  # Episodes that are selected if the filter names no number.
-
-
-class NoEpisodes(ValueError):
-    """A place without recordings, or a filter that no episode passes."""
 
 
 class BadFilter(ValueError):
@@ -29,6 +25,8 @@ class BadFilter(ValueError):
 @dataclass(frozen=True, slots=True)
 class EpisodeFilter:
     """Selects episodes by run, split and outcome; an empty entry, and False, select all. Raises BadFilter.
+
+    `where` is an expression over the columns of the table (`expressions.py`).
 
     `worst` and `best` are numbers of episodes with the lowest and the highest returns; without either, the first LIMIT
     episodes are selected.
@@ -43,6 +41,7 @@ class EpisodeFilter:
     failed: bool = False
     worst: int | None = None
     best: int | None = None
+    where: str = ""
 
     def __post_init__(self) -> None:
         for name in ("worst", "best"):
@@ -77,33 +76,10 @@ def hashes(files: Sequence[Path]) -> dict[Path, str]:
     return {file: manifest[file.name] for file, manifest in listed if file.name in manifest}
 
 
-def episodes(places: Sequence[Path]) -> pd.DataFrame:
-    """The episodes of all runs at places: rows of their tables, with `folder`, `method`, `reaches` and `seed`.
-
-    Raises NoEpisodes, DamagedFile.
-    """
-    tables = [
-        run_files.stored_episodes(run, ()).assign(folder=str(run.path), **run_identity(run)) for run in runs_at(places)
-    ]
-    return pd.concat(tables, ignore_index=True)
-
-
-def run_identity(run: RunFolder) -> dict[str, Any]:
-    """Method, source of reaches and seed of a run, as its recordings have them; raises DamagedFile."""
-    if run.result.exists():
-        content = result_files.read_result(run.result)
-    else:  # The run is not finished; its path has the label.
-        content = schemas.read(run.config, schemas.CONFIG) | {"method": run.label}
-    try:
-        return {name: content[name] for name in ("method", "reaches", "seed")}
-    except KeyError as error:
-        raise atomic.OtherForm(run.config, f"it lacks {error}") from error
-
-
 def select(table: pd.DataFrame, episode_filter: EpisodeFilter) -> tuple[pd.DataFrame, int]:
-    """The episodes that a filter selects, and the number that pass it; raises NoEpisodes."""
+    """The episodes that a filter selects, and the number that pass it; raises NoEpisodes, BadExpression."""
     passing = matching(table, episode_filter)
-    played = passing[passing["length"] > 0]
+    played = passing[passing["steps"] > 0]
     if played.empty:
         unplayed = "; the agent failed before their first step" if len(passing) else ""
         raise NoEpisodes(f"{len(passing)} of {len(table)} episodes match the filter{unplayed}")
@@ -116,32 +92,20 @@ def best_and_worst(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.Dat
     """The episodes with the lowest and the highest returns, as many as the filter says; all if it names no number."""
     if episode_filter.worst is None and episode_filter.best is None:
         return table
-    worst = table.sort_values("score", kind="stable").head(episode_filter.worst or 0)
-    best = table.sort_values("score", ascending=False, kind="stable").head(episode_filter.best or 0)
+    worst = table.sort_values("return", kind="stable").head(episode_filter.worst or 0)
+    best = table.sort_values("return", ascending=False, kind="stable").head(episode_filter.best or 0)
     selected = pd.concat([worst, best])
     return selected[~selected.index.duplicated()]
 
 
 def matching(table: pd.DataFrame, episode_filter: EpisodeFilter) -> pd.DataFrame:
-    """All episodes that pass a filter, without its limit on their number; raises NoEpisodes."""
+    """All episodes that pass a filter, without its limit on their number; raises NoEpisodes, BadExpression."""
+    table = expressions.filtered(table, episode_filter.where, COLUMNS)
     for name in ("method", "reaches", "split", "seed", "row", "cause"):
         if values := getattr(episode_filter, name):
             _check(table, name, values)
             table = table[table[name].isin(values)]
     return table[~table["success"]] if episode_filter.failed else table
-
-
-def runs_at(places: Sequence[Path]) -> list[RunFolder]:
-    """The folders of runs at or below places, each once; raises NoEpisodes."""
-    runs: dict[RunFolder, None] = {}
-    for place in places:
-        if place.is_file():
-            raise NoEpisodes(f"{place} is a file, and episodes are selected from runs; name a run's folder instead")
-        place_runs = list(below(place, RunFolder(place).episodes.name))
-        if not place_runs:
-            raise NoEpisodes(f"no runs at {place} to select episodes from; make one with `dextron-bench run`")
-        runs |= dict.fromkeys(place_runs)
-    return list(runs)
 
 
 def _check(table: pd.DataFrame, name: str, values: Sequence[str | int]) -> None:

@@ -7,9 +7,10 @@ from pathlib import Path
 import pandas as pd
 
 from dextron_bench import recording
-from dextron_bench.catalogue import selection
+from dextron_bench.catalogue import episodes, selection
+from dextron_bench.catalogue.episodes import NoEpisodes
 from dextron_bench.catalogue.rerecording import rerecord
-from dextron_bench.catalogue.selection import EpisodeFilter, NoEpisodes
+from dextron_bench.catalogue.selection import EpisodeFilter
 
 KEY = ["reaches", "split", "digest", "row"]
 PAIRS = "pairs"  # The folder of these recordings, below the folder of all runs.
@@ -37,6 +38,6 @@ def side_by_side(first: Path, second: Path, episode_filter: EpisodeFilter, runs:
 
 def _first_run(place: Path, episode_filter: EpisodeFilter) -> pd.DataFrame:
     """The played episodes of the first run at a place that pass a filter."""
-    table = selection.episodes([place])
-    passing = selection.matching(table[table["folder"] == table["folder"].iloc[0]], episode_filter)
-    return passing[passing["length"] > 0]
+    table = episodes.read([place])
+    passing = selection.matching(table[table["run"] == table["run"].iloc[0]], episode_filter)
+    return passing[passing["steps"] > 0]

@@ -53,20 +53,19 @@ class Browse:
     """Print the matching episodes as JSON and serve nothing."""
 
     def __call__(self) -> int:
-        from dextron_bench.catalogue import episode_catalogue
+        from dextron_bench.catalogue import episodes as catalogue
         from dextron_bench.catalogue.browse.search import Search
-        from dextron_bench.cli.leaderboard.show import none_for_nan
 
         if not self.json and not self.web:
             from dextron_bench.recording import require_screen
 
             require_screen()
         search = Search(self.where, self.order)
-        episodes = episode_catalogue.read(self.place)
+        episodes = catalogue.read(self.place)
         matching = search.matching(episodes)  # Raises BadExpression before anything is served.
         if self.json:
-            rows = matching[list(episode_catalogue.COLUMNS)].to_dict("records")
-            print_json([{str(name): none_for_nan(value) for name, value in row.items()} for row in rows])
+            rows = matching[list(catalogue.COLUMNS)].to_dict("records")
+            print_json(rows)
         else:
             self._serve(episodes, search)
         return DONE

@@ -5,13 +5,14 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
+from dextron_bench.cli.support.method_flags import changed_settings
 from dextron_bench.cli.support.output import print_json
-from dextron_bench.reaches.sources import RankedSource
 
 
 @dataclass(frozen=True)
@@ -19,36 +20,33 @@ class Check:
     """Try an agent on a few episodes, in a separate process as for a submission, and list what to fix.
 
     AGENT is the name of a method, module:Class, file.py:Class, FILE.pt (TorchScript), FILE.onnx, or 'exec:COMMAND' for
-    a program that implements the protocol.
+    a program that implements the protocol. The settings of a class are flags too, after its name, as for `run`.
 
     Example: dextron-bench check my_agent/agent.py:MyAgent
     """
 
     agent: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="AGENT")]
     """The agent; see above for its forms."""
-    reaches: RankedSource = "synthetic"
-    """The source of reaches."""
+    reaches: flags.RankedReaches = "synthetic"
     weights: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
     """Weights of a trained method."""
-    settings: str = "{}"
-    """Settings of a method or class as JSON, such as '{"near": 0.05}'."""
     timeout: float = 10.0
     """Time limit for one answer [s]."""
     memory: float = 4.0
     """Memory limit of the agent [GiB]."""
-    threads: int = 0
-    """Threads of the simulation; 0 means one per processor."""
+    threads: flags.Threads = 0
     trust: bool = False
     """Run a policy's file (TorchScript, ONNX) even without a sandbox, with all your rights."""
     json: bool = False
     """Print the results of the checks as JSON."""
+    method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
         from dextron_bench.methods.isolation.isolated_agent import Limits
         from dextron_bench.methods.isolation.launch import prepare_launch
         from dextron_bench.submissions import conformance, entry
 
-        settings = entry.settings_from_json(self.agent, self.settings, self.reaches)
+        settings = entry.whole_settings(self.agent, changed_settings(self.method_settings), self.reaches)
         launch = prepare_launch(self.agent, settings, self.weights, self.trust)
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
         results = []
@@ -65,8 +63,12 @@ class Check:
 
     def submission(self) -> str:
         """The command that submits what was checked, with each flag of both commands that is not the default."""
+        from dextron_bench.methods import registry
+
         words = ["dextron-bench", "submit", self.agent]
-        for name in ("reaches", "weights", "settings", "timeout", "memory"):
+        for name, value in changed_settings(self.method_settings).items():
+            words += shlex.split(registry.as_flag(name, value))
+        for name in ("reaches", "weights", "timeout", "memory"):
             if (value := getattr(self, name)) != getattr(Check, name):
                 words += [f"--{name}", str(value)]
         words += ["--trust"] if self.trust else []

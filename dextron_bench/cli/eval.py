@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.leaderboard.show import print_beside_published
-from dextron_bench.cli.support import shares
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import progress_bar
-from dextron_bench.reaches.sources import SourceName
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces
+from dextron_bench.cli.support.standings import print_beside_published
 
 if TYPE_CHECKING:
     from dextron_bench.runs import plans
+    from dextron_bench.runs.evaluation_job import EvaluationJob
 
 
 @dataclass(frozen=True)
@@ -28,28 +29,19 @@ class Eval:
     Example: dextron-bench eval --method rlil --dur 0.1 --preset quick --split test
     """
 
-    method: str
-    """The name of a method (see `dextron-bench list`), module:Class or file.py:Class."""
-    reaches: SourceName = "synthetic"
-    """The source of reaches."""
-    split: tuple[str, ...] = ()
-    """The splits to evaluate on; by default all splits that rank methods."""
+    method: flags.Method
+    reaches: flags.Reaches = "synthetic"
+    split: flags.EvalSplits = ()
     seed: tuple[int, ...] = ()
     """The seeds of the weights; by default all that ship."""
     weights: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
     """A file of weights to use instead of the shipped ones, such as weights.safetensors in the folder of a run."""
     record: int = 0
     """How many episodes of each split to record, from the first."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
-    threads: int = 0
-    """Threads of the simulation; 0 means one per processor. The results do not depend on it."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
-    quiet: bool = False
-    """Show no progress."""
+    runs: flags.Runs = flags.RUNS
+    threads: flags.Threads = 0
+    pieces: Pieces = field(default_factory=PieceFlags)
+    quiet: flags.Quiet = False
     json: bool = False
     """Print the rows as JSON."""
     method_settings: tyro.conf.Suppress[Any] = None
@@ -57,12 +49,14 @@ class Eval:
     def __call__(self) -> int:
         from dextron_bench.runs import execution, result_files
 
-        share, runs, folder = shares.parse(self.share, self.merge), self._runs(), self.runs / "eval"
-        if share is not None or self.merge:
-            jobs = [execution.prepare(run, folder, self.threads) for run in runs]
-            if share is not None:
-                return shares.play_jobs(jobs, share, folder, self.quiet)
-            shares.check_jobs(jobs)
+        self.pieces.check()
+        runs, folder = self._runs(), self.runs / "eval"
+
+        def works() -> list[EvaluationJob]:
+            return [execution.prepare(run, folder, self.threads) for run in runs]
+
+        if self.pieces.play(works, folder, self.threads, self.quiet):
+            return DONE
         results = []
         for run in runs:
             with progress_bar(f"{run.label}, seed {run.seed}", self.quiet) as progress:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from dextron_bench.cli.success.evaluation import NoRows
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
-from dextron_bench.reaches.sources import RankedSource
+from dextron_bench.cli.support.rows import NoRows
 
 
 @dataclass(frozen=True)
@@ -22,18 +22,16 @@ class Figures:
     Example: dextron-bench figures --reaches synthetic --into figures
     """
 
-    reaches: RankedSource = "synthetic"
-    """The source of reaches."""
+    reaches: flags.RankedReaches = "synthetic"
     into: Path = Path("figures")
     """The folder for the pictures."""
-    results: Path = Path("leaderboard/results")
-    """Results with the learning curves of figures 4a and 4c; these are left out if the folder does not exist."""
+    board: Path = flags.BOARD
+    """Leaderboard with the learning curves of figures 4a and 4c; without it, these are left out."""
     rows: int = 3000
     """Maximum number of points in figure 3a."""
     settings: int = 100
     """How many settings of `test` the experts and the shipped policies play for figure 5."""
-    threads: int = 0
-    """Threads of the simulation; 0 means one per processor."""
+    threads: flags.Threads = 0
 
     def __call__(self) -> int:
         from dextron_bench.recording import stills
@@ -63,14 +61,15 @@ class Figures:
         yield self._file("fig3b")
 
     def _learning(self) -> Iterator[Path]:
-        from dextron_bench.leaderboard import build
+        from dextron_bench.leaderboard import build, collect
         from dextron_bench.runs import result_files
         from dextron_bench.scores import standings
         from dextron_bench.scores.figures.training import learning_curves
 
-        rows = standings.table(result_files.results(self.results)) if self.results.exists() else None
+        results = self.board / collect.RESULTS
+        rows = standings.table(result_files.results(results)) if results.exists() else None
         for name, cloned, epochs in (("fig4a", False, "epochs of 1,000 frames"), ("fig4c", True, "epochs of training")):
-            all_curves = build.learning_curves(self.results, cloned)
+            all_curves = build.learning_curves(results, cloned)
             curves = {method: seeds for (method, reaches), seeds in all_curves.items() if reaches == self.reaches}
             if curves and rows is not None:
                 source_rows = rows[rows["reaches"] == self.reaches]

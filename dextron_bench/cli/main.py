@@ -5,18 +5,17 @@ The modules of commands import nothing heavy at their top, so that `--help` is q
 
 from __future__ import annotations
 
-import inspect
-import io
 import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import redirect_stderr
-from typing import Annotated, Any, Union
+from collections.abc import Sequence
+from contextlib import nullcontext
+from typing import NoReturn
 
 import tyro
 
-from dextron_bench.cli.commands import COMMANDS, Command, Group
+from dextron_bench.cli import commands, help_screen
+from dextron_bench.cli.commands import Command
 from dextron_bench.cli.support import method_flags, places, streams, usage
 from dextron_bench.cli.support.exit_codes import BUG, DONE, INTERRUPTED, USAGE
 from dextron_bench.cli.support.output import print_warning
@@ -28,11 +27,7 @@ from dextron_bench.processes.limited_process import memory_advice
 THREADS = {"OPENBLAS_NUM_THREADS": "blas", "OMP_NUM_THREADS": "openmp"}
 PACKAGES = ("dextron_bench", "baselines")  # Their exceptions are messages to the user.
 LOOP = "Symlink loop"  # How `Path.resolve` begins to say so, before Python 3.13.
-DESCRIPTION = """Grasping with a prosthetic hand that a person moves: a benchmark.
-
-Exit codes: 0 done, 1 a verification or comparison failed, 2 wrong usage or input, 3 the agent raised errors in some
-episodes, 70 an unexpected error, 130 interrupted. With --debug, or if DEXTRON_DEBUG is set, an error shows its
-traceback."""
+PROGRAM = "dextron-bench"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -137,61 +132,47 @@ def explain(error: BaseException) -> tuple[int, str]:
 
 def _parse(arguments: Sequence[str]) -> Command:
     """The command that the arguments select; wrong arguments end the process with one line and code 2."""
-    if arguments and arguments[0] in method_flags.COMMANDS:
-        command = method_flags.with_method_settings(arguments, COMMANDS[arguments[0]])
-        with method_flags.as_bad_settings(arguments):
-            return _parse_commands({**COMMANDS, arguments[0]: command}, arguments)
-    return _parse_commands(COMMANDS, arguments)
+    names, command, words = commands.find(arguments)
+    if command is None or isinstance(command, commands.Group):
+        if words and words[0] in streams.HELP:
+            help_screen.show(names, command)
+            raise SystemExit(DONE)
+        known = command.members if command else commands.COMMANDS
+        _end(names, _moved(names, words) or usage.unknown_word(words, known))
+    whole = method_flags.with_method_settings(names, words, command)
+    with method_flags.as_bad_settings(words) if whole is not command else nullcontext():
+        return _parsed_flags(names, whole, words)
 
 
-def _parse_commands(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str]) -> Command:
-    """The command; prints one line about wrong arguments instead of the box that tyro draws."""
-    message = io.StringIO()
+def _parsed_flags(names: Sequence[str], command: type[Command], words: Sequence[str]) -> Command:
+    """The command with its flags; prints one line about wrong ones instead of the box that tyro draws."""
+    if any(word in streams.HELP for word in words):
+        description = help_screen.description(names, command)
+        return tyro.cli(command, prog=" ".join([PROGRAM, *names]), description=description, args=words)
     try:
-        with redirect_stderr(message):
-            return tyro.cli(_union(commands, arguments), prog="dextron-bench", description=DESCRIPTION, args=arguments)
-    except SystemExit as ended:
-        if ended.code:
-            name, command = _command_name(commands, arguments), _command(commands, arguments)
-            known = list(command) if isinstance(command, Mapping) else usage.flags(command)
-            unknown = "" if isinstance(command, Mapping) else usage.unknown_flag(arguments, known)
-            line = unknown or usage.with_nearest(usage.one_line(message.getvalue()), known)
-            print(f"dextron-bench: {line}; see `{' '.join(['dextron-bench', *name])} --help`", file=sys.stderr)
-        raise
+        return usage.parse(command, words)
+    except SystemExit:
+        unknown = usage.unknown_flags(words, usage.flags(command))
+        moved = next((line for flag in unknown if (line := _moved_flag(names, flag))), "")
+        _end(names, moved or usage.fault(command, words))
 
 
-def _command_name(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str]) -> list[str]:
-    """The name of the command that the arguments start with, after the name of its group if it has one."""
-    if not arguments or arguments[0] not in commands:
-        return []
-    command = commands[arguments[0]]
-    return [arguments[0], *(_command_name(command[1], arguments[1:]) if isinstance(command, tuple) else ())]
+def _end(names: Sequence[str], fault: str) -> NoReturn:
+    """Ends the process with one line about wrong arguments, and where the help is."""
+    print_warning(f"{fault}; see `{' '.join([PROGRAM, *names])} --help`")
+    raise SystemExit(USAGE)
 
 
-def _command(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str]) -> Any:
-    """The command that the arguments start with, or the table of commands that was searched in vain."""
-    if not arguments or arguments[0] not in commands:
-        return commands
-    command = commands[arguments[0]]
-    return _command(command[1], arguments[1:]) if isinstance(command, tuple) else command
+def _moved(names: Sequence[str], words: Sequence[str]) -> str:
+    """The line about the old name of a command; empty for other words."""
+    old = " ".join([*names, *words[:1]])
+    return f"`{old}` is now {commands.MOVED[old]}" if old in commands.MOVED else ""
 
 
-def _union(commands: Mapping[str, type[Command] | Group], arguments: Sequence[str] = ()) -> Any:
-    """The table of commands as the union type that tyro turns into subcommands.
-
-    The help of the table has the first paragraph of each command, and a command's own help has all of it.
-    """
-    types: list[Any] = []
-    for name, command in commands.items():
-        is_chosen = list(arguments[:1]) == [name]
-        if isinstance(command, tuple):
-            description, members = command
-            union = _union(members, arguments[1:] if is_chosen else ())
-            types.append(Annotated[union, tyro.conf.subcommand(name, description=description)])
-        else:
-            summary = None if is_chosen else (inspect.getdoc(command) or "").split("\n\n", 1)[0]
-            types.append(Annotated[command, tyro.conf.subcommand(name, description=summary)])
-    return Union[tuple(types)]  # noqa: UP007 (built at run time)
+def _moved_flag(names: Sequence[str], flag: str) -> str:
+    """The line about the old name of a flag; empty for other flags."""
+    new = commands.MOVED_FLAGS.get((" ".join(names), flag))
+    return f"{flag} is now {new}" if new else ""
 
 
 def _print_version() -> int:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from dextron_bench.cli.leaderboard.show import print_beside_published
-from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
 from dextron_bench.cli.support.method_flags import settings_dict
 from dextron_bench.cli.support.output import print_json, print_table, print_warning, progress_bar
-from dextron_bench.reaches.sources import SourceName
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces, connected, play_on
+from dextron_bench.cli.support.standings import print_beside_published
 
 TrackerName = Literal["rerun", "tensorboard", "trackio", "wandb"]
 
@@ -34,14 +33,11 @@ class Run:
     Example: dextron-bench run --method rlil --dur 0.1 --preset smoke --reaches synthetic --seed 0 1 2
     """
 
-    method: str = "exp"
-    """The name of a method (see `dextron-bench list`), module:Class or file.py:Class."""
+    method: flags.Method = "exp"
     all: bool = False
     """Run every method of the paper's table instead of one; --preset then applies to all methods with training."""
-    reaches: SourceName = "synthetic"
-    """The source of reaches."""
-    split: tuple[str, ...] = ()
-    """The splits to evaluate on; by default all splits that rank methods."""
+    reaches: flags.Reaches = "synthetic"
+    split: flags.EvalSplits = ()
     track: tuple[str, ...] = ()
     """Also evaluate on these splits under tracks, such as delay-100 or sensing-1 (docs/splits.md)."""
     seed: tuple[int, ...] = (0,)
@@ -52,23 +48,15 @@ class Run:
     """Show the training in these trackers while it runs (docs/following.md)."""
     live: bool = False
     """Show the training in Rerun's viewer while it runs."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
-    cluster: clusters.Flag = ""
-    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
+    runs: flags.Runs = flags.RUNS
     threads: int = 0
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
     depend on it."""
-    device: Literal["cpu", "cuda", "auto"] = "cpu"
-    """The device for training; auto uses a GPU if there is one. The last bits of the weights depend on it."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
+    device: flags.Device = "cpu"
+    pieces: Pieces = field(default_factory=PieceFlags)
     dry_run: bool = False
     """Only print what is left to do and an estimate of the time."""
-    quiet: bool = False
-    """Show no progress."""
+    quiet: flags.Quiet = False
     json: bool = False
     """Print the rows as JSON."""
     method_settings: tyro.conf.Suppress[Any] = None
@@ -78,16 +66,14 @@ class Run:
             from dextron_bench.tracking import packages
 
             packages.require(self.tracker)
-        clusters.check(self.cluster, self.share, self.merge)
-        share, groups = shares.parse(self.share, self.merge), self._groups()
+        self.pieces.check()
+        groups = self._groups()
         if self.dry_run:
             return self._estimate(groups)
-        if share is not None:
-            return self._play(share, groups)
-        if self.merge:
-            shares.check_jobs(self._jobs(groups))
-        if self.cluster:
+        if self.pieces.cluster:
             self._play_on_cluster(groups)
+        elif self.pieces.play(lambda: self._jobs(groups), self.runs, self.threads, self.quiet):
+            return DONE
         return self._execute(groups)
 
     def _jobs(self, groups: list[list[plans.Run]]) -> list[EvaluationJob]:
@@ -95,19 +81,14 @@ class Run:
 
         return [execution.prepare(run, self.runs, self.threads) for group in groups for run in group]
 
-    def _play(self, share: shares.Share, groups: list[list[plans.Run]]) -> int:
-        """Plays the pieces of a share."""
-        return shares.play_jobs(self._jobs(groups), share, self.runs, self.quiet)
-
     def _play_on_cluster(self, groups: list[list[plans.Run]]) -> None:
         """Trains and plays on a cluster what the folder of runs lacks."""
-        from dextron_bench.cluster import evaluations, trainings
+        from dextron_bench.cluster import trainings
 
-        with clusters.connected(self.cluster, self.runs, self.threads) as cluster:
+        with connected(self.pieces.cluster, self.runs, self.threads) as cluster:
             with progress_bar("epochs", self.quiet) as progress:
                 trainings.train(cluster, groups, self.runs, self.device, progress)
-            with progress_bar("pieces", self.quiet) as progress:
-                evaluations.play(cluster, [run for group in groups for run in group], self.runs, progress)
+            play_on(cluster, self._jobs(groups), self.quiet)
 
     def _groups(self) -> list[list[plans.Run]]:
         """The runs of each method, one for each seed."""

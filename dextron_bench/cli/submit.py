@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from dextron_bench.cli.leaderboard.show import print_rows
-from dextron_bench.cli.support import clusters, shares
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE, EPISODES_FAILED
+from dextron_bench.cli.support.method_flags import changed_settings
 from dextron_bench.cli.support.output import progress_bar
-from dextron_bench.reaches.sources import RankedSource
+from dextron_bench.cli.support.pieces import PieceFlags, Pieces
+from dextron_bench.cli.support.standings import print_rows
 from dextron_bench.submissions.declaration import Declaration
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dextron_bench.methods.isolation.isolated_agent import Limits
+    from dextron_bench.runs.evaluation_job import EvaluationJob
     from dextron_bench.submissions.entry import Entry
 
 
@@ -27,7 +28,8 @@ class Submit:
     """Play every episode that ranks methods with an agent in a separate process, and write one bundle (a zip).
 
     AGENT is the name of a method, module:Class, file.py:Class, FILE.pt (TorchScript), FILE.onnx, or 'exec:COMMAND' for
-    a program that implements the protocol. The same command continues an interrupted submission.
+    a program that implements the protocol. The settings of a class are flags too, after
+    its name, as for `run`. The same command continues an interrupted submission.
 
     Example: dextron-bench submit my_agent/agent.py:MyAgent --name my-agent
     """
@@ -36,8 +38,7 @@ class Submit:
     """The agent; see above for its forms."""
     name: str
     """The name of its row on the leaderboard."""
-    reaches: RankedSource = "synthetic"
-    """The source of reaches."""
+    reaches: flags.RankedReaches = "synthetic"
     seed: tuple[int, ...] = (0, 1, 2)
     """Seeds of the agent; one is enough if the agent uses no random numbers."""
     weights: Annotated[Path | None, tyro.conf.arg(metavar="FILE.safetensors")] = None
@@ -54,25 +55,19 @@ class Submit:
     """Memory limit of the agent [GiB]."""
     trust: bool = False
     """Run a policy's file (TorchScript, ONNX) even without a sandbox, with all your rights."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
+    runs: flags.Runs = flags.RUNS
     board: Path = Path("leaderboard")
     """Folder of the leaderboard; the printed table has its methods too. Without it: the published leaderboard."""
-    cluster: clusters.Flag = ""
-    """Do the work on a cluster with Ray: on this machine, on the cluster it belongs to, or on another one."""
     threads: int = 0
     """Threads of the simulation; 0 means one per processor, and on a cluster one for each piece. The results do not
     depend on it."""
-    share: Annotated[str, tyro.conf.arg(metavar="I/N")] = ""
-    """Do only a part of the work: 0/2 and 1/2 are its halves, on one machine or on two (docs/many-machines.md)."""
-    merge: bool = False
-    """Only put together what shares have done; if anything is missing, this is an error that names it."""
-    quiet: bool = False
-    """Show no progress."""
-    settings: str = "{}"
-    """Settings of a method or class as JSON, such as '{"near": 0.05}'."""
+    pieces: Pieces = field(default_factory=PieceFlags)
+    quiet: flags.Quiet = False
+    method_settings: tyro.conf.Suppress[Any] = None
 
     def __call__(self) -> int:
+        from dextron_bench.cluster.tasks import BadCluster
+        from dextron_bench.methods import specs
         from dextron_bench.methods.isolation.isolated_agent import Limits
         from dextron_bench.runs import run_files
         from dextron_bench.scores import cells
@@ -82,15 +77,15 @@ class Submit:
         entry = self._entry()
         file = self.into or Path(f"{entry.name}-{entry.reaches}.zip")
         limits = Limits(answer=self.timeout, memory=int(self.memory * 2**30))
-        clusters.check(self.cluster, self.share, self.merge)
-        share = shares.parse(self.share, self.merge)
-        if share is not None or self.merge:
-            jobs = playing.prepare_all(entry, self.runs, self.record, limits, self.threads)
-            if share is not None:
-                return shares.play_jobs(jobs, share, self.runs, self.quiet)
-            shares.check_jobs(jobs)
-        if self.cluster:
-            self._play_on_cluster(entry, limits)
+        self.pieces.check()
+
+        def works() -> list[EvaluationJob]:
+            if self.pieces.cluster and specs.parse(entry.spec).kind == "command":
+                raise BadCluster(f"{entry.spec} lies on this machine alone: use --share on machines that have it")
+            return playing.prepare_all(entry, self.runs, self.record, limits, self.threads)
+
+        if self.pieces.play(works, self.runs, self.threads, self.quiet):
+            return DONE
         with progress_bar(entry.name, self.quiet) as progress:
             folder = playing.play_entry(entry, self.runs, self.record, limits, self.threads, progress)
         playing.write_bundle(entry, folder, file)
@@ -103,20 +98,11 @@ class Submit:
         )
         return EPISODES_FAILED if failures else DONE
 
-    def _play_on_cluster(self, entry: Entry, limits: Limits) -> None:
-        from dextron_bench.cluster import submissions
-
-        with (
-            clusters.connected(self.cluster, self.runs, self.threads) as cluster,
-            progress_bar(f"{entry.name}, pieces", self.quiet) as progress,
-        ):
-            submissions.play(cluster, entry, self.runs, self.record, limits, progress)
-
     def _entry(self) -> Entry:
         from dextron_bench.submissions import entry as submission_entry
 
         seeds = tuple(dict.fromkeys(self.seed))
-        settings = submission_entry.settings_from_json(self.agent, self.settings, self.reaches)
+        settings = submission_entry.whole_settings(self.agent, changed_settings(self.method_settings), self.reaches)
         return submission_entry.Entry(
             self.name, self.agent, self.reaches, seeds, settings, self.weights, self.declared, self.trust
         )

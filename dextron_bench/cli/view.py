@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.episode_flags import EpisodeFlags
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import print_table, print_warning, progress_bar
@@ -53,19 +54,17 @@ class View(EpisodeFlags):
     diff: bool = False
     """Show two places side by side."""
     live: bool = False
-    """Follow a training, or watch --method play: a name in `list`, file.py:Class, or a label with shipped weights."""
+    """Follow a training, or watch --method play: a method's name, file.py:Class, or a label with shipped weights."""
     speed: float = 1.0
     """Speed of --live, as a multiple of real time; 0 means without delay."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
+    runs: flags.Runs = flags.RUNS
     web: bool = False
     """Open the recordings in the browser; no screen and no GPU is needed here."""
     port: int = 8767
     """With --web: the port on 127.0.0.1; 0 takes a free one."""
     print: bool = False
     """Print the names of the files, one in each line, instead of opening them; works without a display."""
-    quiet: bool = False
-    """Show no progress."""
+    quiet: flags.Quiet = False
 
     def __call__(self) -> int:
         from dextron_bench import recording
@@ -164,9 +163,9 @@ class View(EpisodeFlags):
 
     def _select(self, places: Sequence[Path], episode_filter: EpisodeFilter) -> list[Path]:
         """The recordings of selected episodes; prints a table of them unless --print is set."""
-        from dextron_bench.catalogue import rerecording, selection
+        from dextron_bench.catalogue import episodes, rerecording, selection
 
-        table, matching = selection.select(selection.episodes(places), episode_filter)
+        table, matching = selection.select(episodes.read(places), episode_filter)
         with progress_bar("recordings", self.quiet) as progress:
             files = rerecording.rerecord(table, progress)
         if not self.print:
@@ -181,18 +180,17 @@ class View(EpisodeFlags):
 def _undamaged(files: Sequence[Path]) -> list[Path]:
     """The undamaged recordings; prints a line on stderr for each damaged one. Raises NoEpisodes if all are damaged."""
     from dextron_bench import recording
-    from dextron_bench.catalogue import selection
+    from dextron_bench.catalogue import episodes, selection
 
     summaries = list(recording.summarise(files, whole=True, hashes=selection.hashes(files)))
     damaged = [f"{summary.file}: {summary.damage}" for summary in summaries if summary.damage]
     if len(damaged) == len(summaries):
-        raise selection.NoEpisodes("; ".join(damaged))
+        raise episodes.NoEpisodes("; ".join(damaged))
     for fault in damaged:
         print_warning(fault)
     return [summary.file for summary in summaries if not summary.damage]
 
 
 def _print_episodes(table: pd.DataFrame) -> None:
-    columns = ["method", "reaches", "seed", "split", "row", "score", "length", "cause"]
-    titles = [{"score": "return", "length": "steps"}.get(column, column) for column in columns]
-    print_table("episodes", titles, table[columns].itertuples(index=False))
+    columns = ["method", "reaches", "seed", "split", "row", "return", "steps", "cause"]
+    print_table("episodes", columns, table[columns].itertuples(index=False))

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from dextron_bench.cli.success.evaluation import NoRows
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_table, progress_bar
-from dextron_bench.reaches.sources import SourceName
+from dextron_bench.cli.support.rows import NoRows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -37,8 +37,7 @@ class Windows:
 
     agents: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="AGENT")] = ("reflex",)
     """Methods, labels with shipped weights, module:Class, file.py:Class, or files of weights."""
-    reaches: SourceName = "synthetic"
-    """The source of reaches."""
+    reaches: flags.Reaches = "synthetic"
     split: str = "val"
     """The split."""
     rows: int = 20
@@ -47,10 +46,8 @@ class Windows:
     """Show only the settings of these in which one of the agents fails."""
     into: Annotated[Path, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = Path("figures/windows.png")
     """The file for the picture."""
-    threads: int = 0
-    """Threads of the simulation; 0 means one per processor."""
-    quiet: bool = False
-    """Show no progress."""
+    threads: flags.Threads = 0
+    quiet: flags.Quiet = False
 
     def __call__(self) -> int:
         from dextron_bench.scores.figures import episodes, pictures

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.cluster.tasks import CACHE
+from dextron_bench.cluster.tasks import CACHE, RUNS
 from dextron_bench.reaches.recorded import cache
 from dextron_bench.storage import hashing
-from dextron_bench.storage.folders import visible
 
 KEPT = 64  # Contents that stay in the object store for later tasks.
 
@@ -44,12 +43,11 @@ class References:
         return reference
 
 
-def imported_reaches(reaches: str) -> dict[str, Path]:
-    """The file of imported reaches, as an input, if the source is `real` and they are imported on this machine."""
-    file = cache.imported() if reaches == "real" else None
-    return {f"{CACHE}/{file.name}": file} if file else {}
+def of(reaches: str, files: Mapping[str, Path]) -> dict[str, Path]:
+    """The inputs of a task by their place: `files` by their path below the folder of runs, and imported reaches.
 
-
-def only_file(folder: Path) -> Path | None:
-    """The file in a folder of inputs; None if there is none."""
-    return next(iter(visible(folder, "*")), None)
+    The latter are only needed if the source is `real`, and they are only sent if this machine has imported them.
+    """
+    imported = cache.imported() if reaches == "real" else None
+    placed = {f"{RUNS}/{path}": file for path, file in files.items()}
+    return placed | ({f"{CACHE}/{imported.name}": imported} if imported else {})

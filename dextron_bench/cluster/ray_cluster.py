@@ -59,7 +59,7 @@ class RayCluster:
         check_flag(address)
         self.threads = threads or 1  # Of a task: one uses the processors best.
         self.losses = 0
-        self._address, self._runs = address, runs
+        self.runs, self._address = runs, address
         self._under_way: dict[Any, Task] = {}
         self._lost: dict[str, int] = {}  # By name of the task: how many nodes it has lost.
 
@@ -102,7 +102,7 @@ class RayCluster:
                     if reply is None:
                         again.append(task)
                         continue
-                    write_files(reply.files, self._runs)
+                    write_files(reply.files, self.runs)
                     if done(task):
                         return
         finally:

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.cluster import evaluations
-from dextron_bench.cluster.inputs import imported_reaches
+from dextron_bench.cluster import inputs
+from dextron_bench.cluster.pieces import check_expected
 from dextron_bench.cluster.ray_cluster import RayCluster
-from dextron_bench.cluster.tasks import RUNS, BadCluster, Task
+from dextron_bench.cluster.tasks import BadCluster, Task
 from dextron_bench.methods import registry
 from dextron_bench.runs import plans
 from dextron_bench.storage import folder_config, provenance
@@ -118,8 +118,8 @@ def _trainings(groups: Sequence[Sequence[plans.Run]], runs: Path, threads: int, 
 
 
 def _task(name: str, training: Training, runs: Path, threads: int) -> Task:
-    plan, files = evaluations.without_file(training.run.plan)
-    inputs = {f"{RUNS}/{file.relative_to(runs).as_posix()}": file for file in training.files()}
+    plan, files = plans.without_file(training.run.plan)
+    files |= {file.relative_to(runs).as_posix(): file for file in training.files()}
     arguments: dict[str, Any] = {
         "plan": plan,
         "seeds": training.seeds,
@@ -127,8 +127,8 @@ def _task(name: str, training: Training, runs: Path, threads: int) -> Task:
         "expected": _expected(training),
         "seconds": SECONDS,
     }
-    inputs |= files | imported_reaches(training.job.reaches)
-    return Task(name, train_some, arguments, inputs, threads, gpus=int(training.job.device == "cuda"))
+    gpus = int(training.job.device == "cuda")
+    return Task(name, train_some, arguments, inputs.of(training.job.reaches, files), threads, gpus)
 
 
 def train_some(
@@ -144,12 +144,12 @@ def train_some(
 
     Raises OtherVersion if the method differs from what is expected, and the errors of `TrainingJob.run`.
     """
-    run = plans.resolve(evaluations.with_file(plan, runs))
+    run = plans.resolve(plans.with_file(plan, runs))
     job = run.training_job(runs, threads, device)
     assert job is not None
     training, start = Training(run, job, seeds), time.monotonic()
     first = training.epoch
-    evaluations.check_expected(job.learner.label, _expected(training), expected)
+    check_expected(job.learner.label, _expected(training), expected)
 
     def watch(_: object) -> None:
         if training.epoch > first and time.monotonic() - start > seconds:

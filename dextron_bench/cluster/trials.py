@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from dextron_bench.cluster import evaluations, trainings
+from dextron_bench.cluster import pieces, trainings
 from dextron_bench.cluster.ray_cluster import RayCluster
 from dextron_bench.cluster.tasks import PieceFailed, Task
 from dextron_bench.methods.agents import AgentError
+from dextron_bench.runs import execution
 from dextron_bench.runs.plans import Run
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import source_folder
@@ -37,7 +38,7 @@ def play(cluster: RayCluster, groups: Groups, runs: Path, progress: Progress = n
     """
 
     def play_all(left: Groups) -> None:
-        cluster.run_all([task for group in left for task in _tasks(group, runs, cluster.threads)], progress)
+        cluster.run_all([task for group in left for task in _tasks(cluster, group, runs)], progress)
 
     return _without_failures(groups, play_all, lambda group: group[0].folder(runs).path.parent.relative_to(runs))
 
@@ -66,9 +67,9 @@ def _training_folder(group: Sequence[Run], runs: Path) -> Path:
     return folder.relative_to(runs)
 
 
-def _tasks(group: Sequence[Run], runs: Path, threads: int) -> list[Task]:
+def _tasks(cluster: RayCluster, group: Sequence[Run], runs: Path) -> list[Task]:
     """The tasks of a trial; none if its agent cannot be made, which the sweep finds out and writes down."""
     try:
-        return [task for run in group for task in evaluations.tasks_of(run, runs, threads)]
+        return [task for run in group for task in pieces.tasks_of(cluster, execution.prepare(run, runs))]
     except AgentError:
         return []

@@ -58,9 +58,9 @@ def load(file: Path) -> pd.DataFrame:
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, FileNotFoundError) or getattr(error, "errno", None) is not None:  # Of the system.
             raise
-        raise DamagedDatabase(f"expert database {file} is damaged ({error}); make it again with `mc`") from error
+        raise DamagedDatabase(f"expert database {file} is damaged ({error}); make it again with `data mc`") from error
     if actual != expected:
-        raise DamagedDatabase(f"expert database {file} does not match its summary; make it again with `mc`")
+        raise DamagedDatabase(f"expert database {file} does not match its summary; make it again with `data mc`")
     return rows
 
 
@@ -71,7 +71,7 @@ def summary(file: Path) -> dict[str, Any]:
     except ValueError as error:
         raise DamagedDatabase(f"summary of expert database {file} is damaged ({error}); make it again") from error
     if not isinstance(about, dict) or not {"digest", "search", "statistics"} <= set(about):
-        raise DamagedDatabase(f"summary of expert database {file} is incomplete; make it again with `mc`")
+        raise DamagedDatabase(f"summary of expert database {file} is incomplete; make it again with `data mc`")
     return about
 
 
@@ -90,7 +90,7 @@ def load_shipped(reaches: str) -> tuple[pd.DataFrame, dict[str, Any]]:
     with as_file(files("dextron_bench") / "data") as folder:
         file = folder / f"experts-{reaches}.parquet"
         if not file.exists():
-            raise FileNotFoundError(f"no expert database ships for {reaches!r}; make one with `mc`")
+            raise FileNotFoundError(f"no expert database ships for {reaches!r}; make one with `data mc`")
         return load(file), summary(file)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +19,8 @@ from dextron_bench.runs.plans import Plan, resolve, with_shipped_weights
 from dextron_bench.splits.loading import Split, load_split, ranking_splits
 from dextron_bench.storage.progress import Progress
 from dextron_bench.storage.run_folder import RunFolder
+
+NewAgent = Callable[[], Agent]
 
 
 class NotReproducible(LookupError):
@@ -44,12 +46,13 @@ def rerun(run: RunFolder, result: dict[str, Any], count: int, threads: int, repo
     try:
         if missing := set(ranking_splits(result["reaches"])) - result["splits"].keys():
             finding.problems.append(f"lacks {', '.join(sorted(missing))}")
+        new_agent = agents_of(run, result)
         for name, claimed in result["splits"].items():
             split = load_split(result["reaches"], name)
             if fault := _fault(claimed, split):
                 finding.problems.append(fault)
                 continue
-            done += _rerun_split(run, result, split, drawn_rows(len(split), count), threads, finding)
+            done += _rerun_split(new_agent, claimed, split, drawn_rows(len(split), count), threads, finding)
             report(done, total)
     except (NotReproducible, weights.MissingWeights, AgentError) as error:
         finding.problems.append(str(error))
@@ -67,14 +70,14 @@ def _fault(claimed: dict[str, Any], split: Split) -> str:
 
 
 def _rerun_split(
-    run: RunFolder, result: dict[str, Any], split: Split, rows: np.ndarray, threads: int, finding: Finding
+    new_agent: NewAgent, claimed: dict[str, Any], split: Split, rows: np.ndarray, threads: int, finding: Finding
 ) -> int:
     """Runs the agent on rows of a split and adds the differences; returns how many rows it played in the end."""
-    table = play_rows(run, result, split, rows, threads)
+    table = play_rows(new_agent, split, rows, threads)
     computed, whole = result_files.scores_by_split(table)[split.name], len(rows) == len(split)
-    differences = list(_differences(result["splits"][split.name], computed, rows, whole))
+    differences = list(_differences(claimed, computed, rows, whole))
     if differences and not whole:  # An agent may draw numbers in an order that depends on the other episodes.
-        return _rerun_split(run, result, split, np.arange(len(split)), threads, finding)
+        return _rerun_split(new_agent, claimed, split, np.arange(len(split)), threads, finding)
     finding.problems += [f"{split.name} {difference}" for difference in differences]
     if whole:
         finding.actions[split.name] = computed["actions"]
@@ -93,10 +96,10 @@ def _differences(claimed: dict[str, Any], computed: dict[str, Any], rows: np.nda
             yield f"says {name.replace('_', ' ')} {claimed[name]}; run again it is {computed[name]}"
 
 
-def play_rows(run: RunFolder, result: dict[str, Any], split: Split, rows: np.ndarray, threads: int) -> pd.DataFrame:
-    """The table of the episodes of a row's agent, run again, on some rows of a split."""
-    agent, source = agent_of(run, result), sources.open_source(split.reaches)
-    episodes = dict(rollout(agent, source, split.rows(rows), threads=threads))
+def play_rows(new_agent: NewAgent, split: Split, rows: np.ndarray, threads: int) -> pd.DataFrame:
+    """The table of the episodes of a new agent on some rows of a split."""
+    source = sources.open_source(split.reaches)
+    episodes = dict(rollout(new_agent(), source, split.rows(rows), threads=threads))
     return pd.DataFrame([episode_table.row(split, int(row), episodes[place]) for place, row in enumerate(rows)])
 
 
@@ -107,8 +110,8 @@ def drawn_rows(total: int, count: int) -> np.ndarray:
     return np.sort(np.random.default_rng().choice(total, count, replace=False))
 
 
-def agent_of(run: RunFolder, result: dict[str, Any]) -> Agent:
-    """The agent of a row, from the code and the weights that ship; raises NotReproducible and others."""
+def agents_of(run: RunFolder, result: dict[str, Any]) -> NewAgent:
+    """Makes agents of a row, from the code and the weights that ship; raises NotReproducible and others."""
     maker, seed = result.get("maker", {}), result["seed"]
     if maker.get("method") not in registry.installed_methods():
         raise NotReproducible("has neither its episodes nor a method that ships")
@@ -122,4 +125,4 @@ def agent_of(run: RunFolder, result: dict[str, Any]) -> Agent:
         facts = weights.metadata(shipped.plan.weights)
         if differing := [name for name in ("sha256", *facts) if result["training"].get(name) != facts[name]]:
             raise NotReproducible(f"was made with other weights than those that ship: its {differing[0]} differs")
-    return execution.agent(shipped, shipped.plan.weights)
+    return execution.agents(shipped, shipped.plan.weights)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dextron_bench.leaderboard.baseline_check import drawn_rows, play_rows
+from dextron_bench.leaderboard.baseline_check import agents_of, drawn_rows, play_rows
 from dextron_bench.reaches import sources
 from dextron_bench.splits.fresh_settings import FreshSettings, from_frame, to_frame
 from dextron_bench.splits.loading import Split
@@ -61,9 +61,9 @@ def play(
     run: RunFolder, result: dict[str, Any], fresh: FreshSettings, splits: list[Split], threads: int, report: Progress
 ) -> None:
     """Plays fresh settings with the agent of a baseline's row, and writes the scores into its result."""
-    parts, total = [], sum(len(split) for split in splits)
+    new_agent, parts, total = agents_of(run, result), [], sum(len(split) for split in splits)
     for split in splits:
-        parts.append(play_rows(run, result, split, np.arange(len(split)), threads))
+        parts.append(play_rows(new_agent, split, np.arange(len(split)), threads))
         report(sum(map(len, parts)), total)
     atomic.write_json(run.result, {**result, "fresh": fresh.scores(pd.concat(parts))})
 
@@ -106,12 +106,13 @@ def _faults_of_baseline(
     run: RunFolder, result: dict[str, Any], splits: list[Split], count: int, threads: int
 ) -> list[str]:
     """How the fresh scores of a baseline's row differ from the scores of its agent, run again."""
+    new_agent = agents_of(run, result)
     for split in splits:
         known = result["fresh"]["splits"].get(split.name, {"digest": "", "scores": []})
         if known["digest"] != split.digest or len(known["scores"]) != len(split):
             return [f"it has no scores for every fresh setting of {split.name}"]
         rows = drawn_rows(len(split), count)
-        if play_rows(run, result, split, rows, threads)["score"].tolist() != [known["scores"][row] for row in rows]:
+        if play_rows(new_agent, split, rows, threads)["score"].tolist() != [known["scores"][row] for row in rows]:
             return [f"its scores on fresh settings of {split.name} differ from its episodes, run again"]
     return []
 

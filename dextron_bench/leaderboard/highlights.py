@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import pandas as pd
 
-from dextron_bench.catalogue import rerecording, selection
+from dextron_bench.catalogue import episodes, rerecording
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.methods import registry
 from dextron_bench.reaches import sources
@@ -49,26 +49,27 @@ class Shown:
         return f"../{FOLDER}/{quote(self.file)}"
 
 
-def choose(runs: Path, reaches: Sequence[str], split: str, rows: int) -> pd.DataFrame:
+def choose(runs: Path, reaches: Sequence[str], split: str, rows: int, methods: Sequence[str] = ()) -> pd.DataFrame:
     """The episodes to show from the first rows of a split in a folder of runs, with a `name` for each.
 
-    Each method is shown on the first of the sources `reaches` that it played, at its lowest seed. Raises
-    NoEpisodes, DamagedFile, MissingData.
+    Each method, or each of `methods`, is shown on the first of the sources `reaches` that it played, at its lowest
+    seed; exemplars are of any method. Raises NoEpisodes, DamagedFile, MissingData.
     """
-    table = selection.episodes([runs])
-    table = table.assign(actions=table.get("actions"))  # Runs of earlier versions did not keep actions.
+    table = episodes.read([runs])
     table = table[table["reaches"].isin(reaches) & (table["split"] == split) & (table["row"] < rows)]
-    table = table[(table["length"] > 0) & table["actions"].notna()]
+    table = episodes.with_actions(table[table["steps"] > 0])
+    table = table[table["actions"].notna()]  # Runs of earlier versions did not keep actions.
     order = table["reaches"].map(reaches.index)
     table = table[order == order.groupby(table["method"]).transform("min")]
     table = table[table["seed"] == table.groupby("method")["seed"].transform("min")]
     if table.empty:
-        raise selection.NoEpisodes(
+        raise episodes.NoEpisodes(
             f"no run in {runs} played {split} of {' or '.join(reaches)} reaches; `dextron-bench run` does"
         )
     by_source = {name: table[table["reaches"] == name] for name in reaches}
     cases = [case for name, group in by_source.items() if len(group) for case in _exemplars(group, name, split)]
-    return pd.concat([*_shortest(table), *cases], ignore_index=True).drop_duplicates("name")
+    shown = table[table["method"].isin(methods)] if methods else table
+    return pd.concat([*_shortest(shown), *cases], ignore_index=True).drop_duplicates("name")
 
 
 def record_outcomes(run: Path, name: str, reaches: str, into: Path) -> list[Path]:
@@ -79,8 +80,8 @@ def record_outcomes(run: Path, name: str, reaches: str, into: Path) -> list[Path
     """
     for outcome in OUTCOMES:
         (into / f"{name}-{outcome}.rrd").unlink(missing_ok=True)
-    table = selection.episodes([run])
-    table = table[(table["split"] == ranking_splits(reaches)[0]) & (table["length"] > 0)]
+    table = episodes.read([run])
+    table = table[(table["split"] == ranking_splits(reaches)[0]) & (table["steps"] > 0)]
     table = table[table["seed"] == table["seed"].min()]
     files = make(pd.concat([*_shortest(table)]), into) if len(table) else []
     for seed in seed_folders(run):
@@ -136,7 +137,7 @@ def _shortest(table: pd.DataFrame) -> Iterator[pd.DataFrame]:
     for method, rows in table.groupby("method"):
         for outcome in OUTCOMES:
             same_outcome = rows[rows["success"] == (outcome == "success")]
-            yield same_outcome.sort_values("length", kind="stable").head(1).assign(name=f"{method}-{outcome}")
+            yield same_outcome.sort_values("steps", kind="stable").head(1).assign(name=f"{method}-{outcome}")
 
 
 def _exemplars(table: pd.DataFrame, reaches: str, split: str) -> Iterator[pd.DataFrame]:

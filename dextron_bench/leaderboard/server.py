@@ -67,5 +67,7 @@ class Server(LocalServer):
     def __init__(self, site: Site, port: int) -> None:
         """Listens at a port; 0 takes a free one. Raises NoPage, NoPort."""
         if not (site.board / FILE).is_file():
-            raise NoPage(f"{site.board} has no {FILE}; `dextron-bench leaderboard build --into {site.board}` builds it")
+            raise NoPage(
+                f"{site.board} has no {FILE}; `dextron-bench leaderboard build --board {site.board}` builds it"
+            )
         super().__init__(site, port)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dextron_bench.leaderboard.baseline_check import play_rows
+from dextron_bench.leaderboard.baseline_check import agents_of, play_rows
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import Split, UnknownSplit, load_split, splits_under
 from dextron_bench.splits.tracks import TRACKS
@@ -34,9 +34,9 @@ def missing(result: dict[str, Any], splits: Sequence[Split]) -> list[Split]:
 
 def play(run: RunFolder, result: dict[str, Any], splits: Sequence[Split], threads: int, report: Progress) -> None:
     """Plays splits with the agent of a baseline's row, and writes the scores of each into its result."""
-    done, total = 0, sum(len(split) for split in splits)
+    new_agent, done, total = agents_of(run, result), 0, sum(len(split) for split in splits)
     for split in splits:
-        table = play_rows(run, result, split, np.arange(len(split)), threads)
+        table = play_rows(new_agent, split, np.arange(len(split)), threads)
         result = {**result, "splits": {**result["splits"], **result_files.scores_by_split(table)}}
         atomic.write_json(run.result, result)
         report(done := done + len(split), total)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -51,10 +52,13 @@ def all_shipped(reaches: str) -> list[Path]:
     return sorted(file for folder in folders for file in visible(folder, f"*/{reaches}/seed*.safetensors"))
 
 
-def metadata(file: Path) -> dict[str, Any]:
-    """The training that made a file's weights, and the SHA-256 of the file; raises BadTensors, OSError."""
+def metadata(file: Path, sha256: str = "") -> dict[str, Any]:
+    """The training that made a file's weights, and the SHA-256 of the file, which is computed if it is not given.
+
+    Raises BadTensors, OSError.
+    """
     header = tensors.read_about(file)
-    return {**{name: header[name] for name in METADATA if name in header}, "sha256": hashing.sha256(file)}
+    return {**{name: header[name] for name in METADATA if name in header}, "sha256": sha256 or hashing.sha256(file)}
 
 
 def seed_of(file: Path) -> int:
@@ -65,6 +69,14 @@ def seed_of(file: Path) -> int:
 
 def load_agent(learner: Learner, file: Path) -> Agent:
     """The agent of a file's weights, tried on one state; raises BadWeights, BadTensors, OSError."""
+    return load_agents(learner, file)()
+
+
+def load_agents(learner: Learner, file: Path) -> Callable[[], Agent]:
+    """Makes agents of a file's weights, which are read once and tried on one state.
+
+    Raises BadWeights, BadTensors, OSError.
+    """
     arrays = tensors.read(file)
     label = tensors.read_about(file).get("label", learner.label)
     if label != learner.label:
@@ -83,7 +95,7 @@ def load_agent(learner: Learner, file: Path) -> Agent:
         ) from error
     if shape != (1, 1):
         raise BadWeights(f"{file} holds no weights that fit {learner.label!r}: actions of shape {shape} for one state")
-    return learner.policy(arrays)
+    return lambda: learner.policy(arrays)
 
 
 def load_agent_from_file(file: Path) -> Agent:

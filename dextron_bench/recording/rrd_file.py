@@ -32,7 +32,10 @@ class UnwritableRecording(OSError):
 
     def __init__(self, file: Path, reason: object) -> None:
         super().__init__(f"cannot write recording {file}: {reason}")
-        self.reason = str(reason)
+        self.file, self.reason = file, str(reason)
+
+    def __reduce__(self) -> tuple[type[UnwritableRecording], tuple[Path, str]]:
+        return UnwritableRecording, (self.file, self.reason)  # It comes from processes that write recordings.
 
 
 def save(

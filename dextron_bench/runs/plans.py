@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.methods import registry
+from dextron_bench.methods import registry, specs
 from dextron_bench.methods import weights as method_weights
 from dextron_bench.methods.learners import Learner, PolicyTransfer
 from dextron_bench.methods.registry import Entrant
@@ -15,6 +15,8 @@ from dextron_bench.splits.loading import ranking_splits, splits_under
 from dextron_bench.storage import schemas
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.training.jobs import TrainingJob
+
+ENTRANT = "entrant"  # Folder below the runs of another process, with the files of the method.
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,25 @@ def resolve(plan: Plan) -> Run:
     policy = method.source_policy if isinstance(method, PolicyTransfer) else method
     learner = policy if isinstance(policy, Learner) else None
     return Run(plan, method, learner, registry.label(method), registry.run_source(method, plan.reaches))
+
+
+def without_file(plan: Plan) -> tuple[Plan, dict[str, Path]]:
+    """The plan for another process, with only the name of the file that its method lies in, if any.
+
+    Also returns this file by its place below the folder of all runs.
+    """
+    spec = specs.parse(plan.method)
+    if spec.file is None:
+        return plan, {}
+    return replace(plan, method=str(replace(spec, location=spec.file.name))), {f"{ENTRANT}/{spec.file.name}": spec.file}
+
+
+def with_file(plan: Plan, runs: Path) -> Plan:
+    """The plan with its method's file below a folder of runs; undoes `without_file`."""
+    spec = specs.parse(plan.method)
+    if spec.file is None:
+        return plan
+    return replace(plan, method=str(replace(spec, location=str(runs / ENTRANT / spec.file))))
 
 
 def with_tracks(run: Run, names: Sequence[str]) -> Run:

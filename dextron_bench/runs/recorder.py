@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-import json
+import multiprocessing
 import os
-import pickle
-import queue
-import subprocess
+import signal
+import threading
 from collections import deque
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from collections.abc import Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.experts.policies import Case
-from dextron_bench.processes import programs
 from dextron_bench.processes.limited_process import SINGLE_THREADED
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import recording_files
 
 EACH = 12  # Recordings for each process, at least: a process takes as long to start as to write them, some 2 s.
 AHEAD = 3  # Recordings for each process that are written or wait for it; with more, the rollout waits.
-COMMAND = programs.python("-m", "dextron_bench.runs.recorder_process")
+APART = {
+    **SINGLE_THREADED,
+    "PYTHONSAFEPATH": "1",  # Nothing is imported from the working folder.
+    "PYTHONWARNINGS": "ignore:resource_tracker",  # Silent if this process is killed.
+}
+_SOURCE: list[Source] = []  # In a process that writes recordings: where their reaches come from.
 
 
 class LostProcess(RuntimeError):
@@ -40,36 +44,29 @@ class Recorder:
         """
         processes = min(threads or _processors(), count // EACH)
         self._source, self._count = source, processes if processes > 1 else 0
-        self._processes: list[_Process] = []
-        self._idle = queue.SimpleQueue[_Process]()
-        self._threads = ThreadPoolExecutor(max(self._count, 1))  # Each waits for the answer of a process.
+        self._pool = _pool(source, self._count) if self._count else None
         self._writing = deque[tuple[Path, Future[str]]]()
         self._hashes: dict[Path, str] = {}
 
     def __enter__(self) -> Self:
-        for _ in range(self._count):
-            self._processes.append(_Process(self._source))
-            self._idle.put(self._processes[-1])
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._threads.shutdown(cancel_futures=True)
-        for process in self._processes:
-            process.end()
+    def __exit__(self, *_: object) -> None:
+        if self._pool:
+            self._pool.shutdown(cancel_futures=True)
 
     def write(self, file: Path, case: Case, episode: Episode, properties: dict[str, Any]) -> None:
         """Writes the recording of an episode, now or later, as `recording_files.write` does.
 
         Raises UnwritableRecording and LostProcess, also for earlier recordings.
         """
-        if not self._count:
+        if not self._pool:
             self._hashes[file] = recording_files.write(self._source, file, case, episode, properties)
             return
         if len(self._writing) == AHEAD * self._count:
             self._wait_for_first()
-        self._writing.append((file, self._threads.submit(self._write_beside, file, case, episode, properties)))
+        with _naming_lost_processes(), _apart():
+            self._writing.append((file, self._pool.submit(_write, file, case, episode, properties)))
 
     def hashes(self) -> dict[Path, str]:
         """The SHA-256 of each file, once all are written. Raises UnwritableRecording, LostProcess."""
@@ -79,62 +76,57 @@ class Recorder:
 
     def _wait_for_first(self) -> None:
         file, written = self._writing.popleft()
-        self._hashes[file] = written.result()
-
-    def _write_beside(self, *job: Any) -> str:
-        process = self._idle.get()
-        try:
-            return process.write(*job)
-        finally:
-            self._idle.put(process)
+        with _naming_lost_processes():
+            self._hashes[file] = written.result()
 
 
-class _Process:
-    """A process that writes one recording after the other."""
+def _pool(source: Source, processes: int) -> ProcessPoolExecutor:
+    """Processes that write recordings of a source; each starts when there is work for it."""
+    with _apart():
+        return ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin, (source,))
 
-    def __init__(self, source: Source) -> None:
-        environment = {**os.environ, **SINGLE_THREADED}
-        self._popen = subprocess.Popen(  # In a session of its own, Ctrl-C does not reach it.
-            COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, start_new_session=True
-        )
-        self._send(source)
 
-    def write(self, file: Path, *job: Any) -> str:
-        """The SHA-256 of a recording that is written; raises UnwritableRecording, LostProcess."""
-        from dextron_bench.recording.rrd_file import UnwritableRecording  # Loads Rerun.
+@contextmanager
+def _apart() -> Iterator[None]:
+    """Processes that start in the block never receive Ctrl-C, and have the variables of APART."""
+    before = dict(os.environ)
+    os.environ |= APART
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT]) if hasattr(signal, "pthread_sigmask") else None
+    try:
+        yield
+    finally:
+        for name in APART.keys() - before.keys():
+            del os.environ[name]
+        os.environ |= before
+        if mask is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
-        self._send((file, *job))
-        assert self._popen.stdout
-        line = self._popen.stdout.readline()
-        if not line.endswith(b"\n"):
-            raise self._lost()
-        answer: dict[str, str] = json.loads(line)
-        if "error" in answer:
-            raise UnwritableRecording(file, answer["error"])
-        return answer["sha256"]
 
-    def end(self) -> None:
-        """Lets the process end, and waits until it has."""
-        assert self._popen.stdin
-        assert self._popen.stdout
-        with suppress(BrokenPipeError):
-            self._popen.stdin.close()
-        self._popen.stdout.close()
-        self._popen.wait()
-
-    def _send(self, content: object) -> None:
-        assert self._popen.stdin
-        try:
-            pickle.dump(content, self._popen.stdin)
-            self._popen.stdin.flush()
-        except BrokenPipeError as error:
-            raise self._lost() from error
-
-    def _lost(self) -> LostProcess:
-        return LostProcess(
-            f"a process that writes recordings has ended (code {self._popen.wait()}); "
+@contextmanager
+def _naming_lost_processes() -> Iterator[None]:
+    try:
+        yield
+    except BrokenProcessPool as error:
+        raise LostProcess(
+            "a process that writes recordings has ended; "
             "run the command again, with --threads 1 if this process alone shall write them"
-        )
+        ) from error
+
+
+def _begin(source: Source) -> None:
+    """Prepares a process for recordings of a source; it ends with the process that started it, however that ends."""
+    _SOURCE[:] = [source]
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    if parent := multiprocessing.parent_process():
+        parent.join()
+        os._exit(0)
+
+
+def _write(*job: Any) -> str:
+    return recording_files.write(_SOURCE[0], *job)
 
 
 def _processors() -> int:

@@ -33,24 +33,25 @@ def any_missing(folder: RunFolder, table: pd.DataFrame, record: int) -> bool:
 def record(folder: RunFolder, source: Source, split: Split, row: int, episode: Episode, about: dict[str, Any]) -> None:
     """Writes the recording of an episode, and its hash in the manifest; `about` is as in `properties`."""
     file = folder.recording(split.name, row)
-    sha256 = write(source, file, split.case(row), episode, properties(split, row, about))
+    case = split.case(row)
+    about = properties(split, row, about, diagnosis.diagnose(episode, case).cause)
+    sha256 = write(source, file, case, episode, about)
     add_to_manifest(folder, {file.name: sha256})
 
 
-def properties(split: Split, row: int, about: dict[str, Any]) -> dict[str, Any]:
+def properties(split: Split, row: int, about: dict[str, Any], cause: str) -> dict[str, Any]:
     """The properties of the recording of a row; `about` names method, source of reaches and seed."""
-    return {**about, "split": split.name, "split_digest": split.digest, "row": row}
+    return {**about, "split": split.name, "split_digest": split.digest, "row": row, "cause": cause}
 
 
 def write(source: Source, file: Path, case: Case, episode: Episode, about: dict[str, Any]) -> str:
     """Writes the recording of an episode of a case, with properties `about`; returns its SHA-256.
 
-    It also has what the shipped success model predicts, and why the episode ended as it did. Raises
-    UnwritableRecording.
+    It also has what the shipped success model predicts. Raises UnwritableRecording.
     """
     from dextron_bench import recording  # Loads Rerun, which evaluation alone does not need.
 
-    about = {**about, "cause": diagnosis.diagnose(episode, case).cause, "physics": model.mjcf_hash()}
+    about = {**about, "physics": model.mjcf_hash()}
     return recording.write(file, episode, source.path(episode.setting), about, _predictions(source, case, episode))
 
 

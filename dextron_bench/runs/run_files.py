@@ -36,10 +36,14 @@ def failures(folders: Iterable[RunFolder]) -> dict[str, int]:
     return {str(reason): int(count) for reason, count in reasons[reasons != ""].value_counts().items()}
 
 
-def copy_weights(file: Path, folder: RunFolder) -> Path:
-    """Copies weights into the folder of a run; raises FolderMismatch if it holds other weights."""
+def copy_weights(file: Path, folder: RunFolder) -> str:
+    """Copies weights into the folder of a run, and returns their SHA-256; each file is read once.
+
+    Raises FolderMismatch if the folder holds other weights.
+    """
     if not folder.weights.exists():
         atomic.write_atomically(folder.weights, lambda part: shutil.copyfile(file, part))
-    if hashing.sha256(folder.weights) != hashing.sha256(file):
+    sha256 = hashing.sha256(folder.weights)
+    if file != folder.weights and hashing.sha256(file) != sha256:
         raise FolderMismatch(f"{folder.path} holds a run with other weights; {RUN_ADVICE}")
-    return folder.weights
+    return sha256

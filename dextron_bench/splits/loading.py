@@ -30,7 +30,7 @@ class UnknownSplit(KeyError):
     """A source of reaches has no split of that name."""
 
     def __init__(self, name: str, reaches: str, names: Sequence[str]) -> None:
-        choice = f"choose from {', '.join(names)}" if names else "none ships; see `dextron-bench list`"
+        choice = f"choose from {', '.join(names)}" if names else "none ships; see `dextron-bench data splits`"
         super().__init__(f"no split {name!r} of {reaches!r} reaches; {choice}")
 
     def __str__(self) -> str:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dextron_bench.methods import registry
+from dextron_bench.methods import registry, specs
 from dextron_bench.methods.isolation.launch import Launch, prepare_launch
 from dextron_bench.submissions import bundle, names
 from dextron_bench.submissions.declaration import Declaration
@@ -21,25 +20,14 @@ class BadSubmission(ValueError):
     """An entry that cannot be submitted; the message says what is wrong."""
 
 
-def settings_from_json(spec: str, text: str, reaches: str) -> dict[str, Any]:
-    """An agent's settings from a JSON object; raises BadSubmission, BadSettings.
+def whole_settings(spec: str, settings: dict[str, Any], reaches: str) -> dict[str, Any]:
+    """An agent's settings; an installed method also has its defaults for the source of reaches.
 
-    An installed method gets all its settings, with the defaults for the source of reaches.
+    Raises BadSettings.
     """
-    settings = _json_object(text)
     if spec in registry.installed_methods():
         return registry.settings_of(registry.create(spec, settings, reaches))
     return settings
-
-
-def _json_object(text: str) -> dict[str, Any]:
-    try:
-        value = json.loads(text)
-    except ValueError as error:
-        raise BadSubmission(f"--settings is not valid JSON ({error})") from error
-    if not isinstance(value, dict):
-        raise BadSubmission("--settings takes a JSON object, such as '{\"near\": 0.05}'")
-    return value
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,3 +82,10 @@ class Entry:
     def files(self) -> dict[str, Path]:
         """The agent's own files, by name; with them it can run again."""
         return {file.name: file for file in (self.launch.spec.file, self.weights) if file}
+
+    def in_folder(self, folder: Path) -> Entry:
+        """The entry, with its files in a folder."""
+        spec = specs.parse(self.spec)
+        if spec.file is not None:
+            spec = replace(spec, location=str(folder / spec.file.name))
+        return replace(self, spec=str(spec), weights=folder / self.weights.name if self.weights else None)

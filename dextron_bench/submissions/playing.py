@@ -15,8 +15,10 @@ from dextron_bench.reaches import sources
 from dextron_bench.reaches.setting import Source
 from dextron_bench.runs import result_files
 from dextron_bench.runs.evaluation_job import EvaluationJob, Played
+from dextron_bench.runs.plans import ENTRANT
 from dextron_bench.splits.loading import Split, load_split, ranking_splits
 from dextron_bench.storage import folder_config, hashing, provenance
+from dextron_bench.storage.pieces import Place, Recipe
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle
@@ -45,31 +47,47 @@ def prepare_all(entry: Entry, runs: Path, record: int, limits: Limits, threads: 
     A piece of an evaluation is a whole split, since its rows are shuffled. Raises BadBundle if a bundle could not hold
     the entry, FolderMismatch, MissingData.
     """
-    bundle.check({"format": bundle.FORMAT, **entry.manifest(), "files": {}}, "bundle", entry.folder(runs))
-    bundle.check_agent(entry.files())
+    launch, manifest, files = entry.launch, entry.manifest(), entry.files()
+    bundle.check({"format": bundle.FORMAT, **manifest, "files": {}}, "bundle", entry.folder(runs))
+    bundle.check_agent(files)
     source = sources.open_source(entry.reaches)
-    return [
-        _prepare(entry, source, RunFolder.of_seed(entry.folder(runs), seed), record, limits, threads)
-        for seed in entry.seeds
-    ]
-
-
-def _prepare(
-    entry: Entry, source: Source, folder: RunFolder, record: int, limits: Limits, threads: int
-) -> EvaluationJob:
-    """The evaluation of one seed."""
     splits = [load_split(entry.reaches, name) for name in ranking_splits(entry.reaches)]
-    config = _config(entry, folder.seed)
-    folder_config.write_or_check(folder.path, config)
-    about = {"method": entry.name, "reaches": entry.reaches, "seed": folder.seed}
-
-    def play(split: Split, rows: range) -> Played:
-        return play_shuffled(entry.launch, source, split, folder.seed, limits, threads)
-
+    hashes = {name: hashing.sha256(file) for name, file in files.items()}
+    common = {name: manifest[name] for name in ("agent", "reaches", "physics")} | {"method": entry.name}
     code = provenance.code_hash()
-    return EvaluationJob(
-        folder, source, splits, play, record, about, about, config, code, one_platform=True, threads=threads
-    )
+
+    def job(seed: int) -> EvaluationJob:
+        def play(split: Split, rows: range) -> Played:
+            return play_shuffled(launch, source, split, seed, limits, threads)
+
+        folder, config = RunFolder.of_seed(entry.folder(runs), seed), {**common, "seed": seed, "files": hashes}
+        folder_config.write_or_check(folder.path, config)
+        about = {"method": entry.name, "reaches": entry.reaches, "seed": seed}
+        arguments = {"entry": entry.in_folder(Path()), "record": record, "limits": limits, "seed": seed}
+        made = Recipe(_prepare_again, arguments, entry.reaches, {f"{ENTRANT}/{name}": files[name] for name in files})
+        return EvaluationJob(
+            folder.path,
+            source,
+            splits,
+            play,
+            record,
+            about,
+            about,
+            config,
+            code,
+            made,
+            one_platform=True,
+            threads=threads,
+        )
+
+    return [job(seed) for seed in entry.seeds]
+
+
+def _prepare_again(place: Place, entry: Entry, record: int, limits: Limits, seed: int) -> EvaluationJob:
+    """The evaluation of a seed of an entry whose files another process has put below the folder of runs."""
+    entry = entry.in_folder(place.runs / ENTRANT)
+    jobs = prepare_all(entry, place.runs, record, limits, place.threads)
+    return next(job for job in jobs if job.folder.seed == seed)
 
 
 def play_shuffled(
@@ -91,12 +109,3 @@ def row_order(split: Split, seed: int) -> np.ndarray:
 def write_bundle(entry: Entry, folder: Path, file: Path) -> dict[str, Any]:
     """Writes the bundle of an entry whose runs are complete; returns its manifest."""
     return bundle.pack(folder, entry.manifest(), entry.files(), file)
-
-
-def _config(entry: Entry, seed: int) -> dict[str, Any]:
-    """What the run of a seed depends on."""
-    manifest = entry.manifest()
-    hashes = {name: hashing.sha256(file) for name, file in entry.files().items()}
-    return {name: manifest[name] for name in ("agent", "reaches", "physics")} | {
-        "method": entry.name, "seed": seed, "files": hashes
-    }  # fmt: skip

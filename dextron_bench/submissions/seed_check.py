@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from dextron_bench.reaches import sources
 from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic
-from dextron_bench.storage.progress import Progress
+from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle, episode_tables, playing, relaunch, replay_check
 from dextron_bench.submissions.recording_check import RecordingCheck
@@ -29,10 +29,10 @@ from dextron_bench.submissions.verdict import SeedFinding
 class Playing:
     """How an agent runs again: its limits, whether it may run without a sandbox, and what hears of the progress."""
 
-    limits: Limits
-    trust: bool
-    threads: int
-    report: Progress
+    limits: Limits = field(default_factory=Limits)
+    trust: bool = False
+    threads: int = 0
+    report: Progress = no_progress
 
 
 class SeedCheck:

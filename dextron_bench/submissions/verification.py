@@ -12,10 +12,8 @@ from typing import Any
 
 from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import sandbox
-from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.splits.fresh_settings import FreshSettings
 from dextron_bench.splits.loading import load_split, ranking_splits
-from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.run_folder import seed_folders
 from dextron_bench.submissions import bundle, duplicates
 from dextron_bench.submissions.seed_check import Playing, SeedCheck
@@ -27,19 +25,16 @@ def verify(
     folder: Path,
     manifest: dict[str, Any],
     board: Path | None = None,
+    how: Playing | None = None,
     rerun: bool = False,
-    threads: int = 0,
-    limits: Limits | None = None,
-    trust: bool = False,
     fresh: FreshSettings | None = None,
-    report: Progress = no_progress,
 ) -> Verdict:
     """Checks an unpacked bundle (see `bundle.unpack`) against the splits, the engine and the results on a board.
 
-    With `rerun` the agent also runs again, from the files in the bundle, and in the sandbox only unless `trust` is
-    True; then it also plays `fresh` settings, if they are given. Raises MissingData, OSError.
+    With `rerun` the agent also runs again, from the files in the bundle, and in the sandbox only unless `how` trusts
+    it; then it also plays `fresh` settings, if they are given. Raises MissingData, OSError.
     """
-    verdict, numbers = Verdict(manifest), manifest["seeds"]
+    how, verdict, numbers = how or Playing(), Verdict(manifest), manifest["seeds"]
     if manifest["physics"] != model.mjcf_hash():
         verdict.problems.append("was played with other physics than this version's; submit it again with this version")
         return verdict
@@ -48,11 +43,10 @@ def verify(
     splits = [load_split(manifest["reaches"], name) for name in ranking_splits(manifest["reaches"])]
     seeds = [SeedCheck(folder, manifest, seed, splits) for seed in numbers]
     for seed in seeds:
-        verdict.add(seed.check(threads, report))
+        verdict.add(seed.check(how.threads, how.report))
     if extra := sorted({run.seed for run in seed_folders(folder)} - set(numbers)):
         verdict.problems.append(f"holds seed{extra[0]}, which is not among the seeds that its manifest lists")
     if rerun and verdict.passed:
-        how = Playing(limits or Limits(), trust, threads, report)
         _rerun(folder, seeds, verdict, how)
         if fresh is not None and verdict.passed:
             _play_fresh(fresh, seeds, verdict, how)

@@ -83,7 +83,7 @@ def _scores(run: Run, subject: str, held_out: Split, job: TrainingJob | None, re
         if stored["depends on"] == depends:
             return stored
     rows = _once(held_out)
-    source, agent = sources.open_source(run.source), execution.agent(run, weights)
+    source, agent = sources.open_source(run.source), execution.agents(run, weights)()
     episodes = dict(rollout(agent, source, rows, threads=resources.threads))
     failed = sum(bool(episode.failure) for episode in episodes.values())
     content = {"depends on": depends, "scores": [episodes[row].score for row in range(len(rows))], "failed": failed}

@@ -10,6 +10,8 @@ from typing import Protocol
 from dextron_bench.evaluation.episodes import Episode
 from dextron_bench.tracking.training_files import Point, TrainingFiles
 
+RUN_LIBRARIES = ("wandb", "trackio")  # Libraries with the interface of W&B.
+
 
 class Tracker(Protocol):
     """Shows a training somewhere. Any of its methods may raise anything: the follower counts what is lost by that."""
@@ -33,5 +35,9 @@ class Tracker(Protocol):
 
 def create(name: str, files: TrainingFiles, into: Path) -> Tracker:
     """A tracker that writes into a folder of its own, which is empty."""
+    if name in RUN_LIBRARIES:
+        from dextron_bench.tracking import to_wandb
+
+        return to_wandb.create(name, files, into)
     module = importlib.import_module(f"dextron_bench.tracking.to_{name}")
     return module.create(files, into)

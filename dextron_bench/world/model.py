@@ -1,15 +1,22 @@
-"""The MuJoCo model of hand, bottle and table. Only this module uses the names of its elements."""
+"""The MuJoCo model of hand, bottle and table. Only this module and `tools/hand_constants.py` use names of its elements.
+
+What pure functions of states need of the model is in `hand.json`, so that they work without the simulator.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
 from functools import cache
 from importlib.resources import files
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dextron_bench.reaches.timing import CONTROL_STEP
-from dextron_bench.world.simulator import mujoco
+
+if TYPE_CHECKING:
+    from dextron_bench.world.simulator import mujoco
 
 DIGITS = ("thumb", "index", "middle", "ring", "little")
 STATE = 48  # qpos (25), then qvel (23).
@@ -21,7 +28,6 @@ BOTTLE_POSITION = slice(0, 3)
 BOTTLE_QUATERNION = slice(3, 7)
 PALM_POSITION = slice(7, 10)
 PALM_QUATERNION = slice(10, 14)
-FREE_POSITIONS, FREE_VELOCITIES = ("x", "y", "z", "qw", "qx", "qy", "qz"), ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 def mjcf() -> str:
@@ -37,6 +43,8 @@ def mjcf_hash() -> str:
 @cache
 def load() -> mujoco.MjModel:
     """The compiled model. All callers share it and must not change it."""
+    from dextron_bench.world.simulator import mujoco
+
     return mujoco.MjModel.from_xml_string(mjcf())
 
 
@@ -49,9 +57,7 @@ def substeps() -> int:
 @cache
 def proximal() -> tuple[np.ndarray, np.ndarray]:
     """Indices in qpos of the five proximal joints, thumb first, and their angles [rad] when closed; each (5,)."""
-    joints = [load().joint(f"{digit}_proximal") for digit in DIGITS]
-    closed = [joint.range[np.argmax(np.abs(joint.range))] for joint in joints]
-    return _read_only(np.array([joint.qposadr[0] for joint in joints])), _read_only(np.array(closed))
+    return _read_only(np.array(_constants()["proximal"], np.int32)), _read_only(np.array(_constants()["closed"]))
 
 
 @cache
@@ -66,7 +72,7 @@ def initial_qpos() -> np.ndarray:
 
     Only the proximal joints are set, to half of their range; the couplings then pull each digit open by about a third.
     """
-    return _read_only(load().key("start").qpos.copy())
+    return _read_only(np.array(_constants()["start"]))
 
 
 @cache
@@ -83,12 +89,13 @@ def state_names() -> tuple[str, ...]:
     Positions are in [m], quaternions are wxyz, and angles are in [rad]. For free bodies, `vx` to `vz` are velocities in
     the world frame [m/s], and `wx` to `wz` are angular velocities about the axes of the body [rad/s].
     """
-    positions, velocities = [], []
-    for joint in map(load().joint, range(load().njnt)):  # In the order of qpos.
-        free = joint.type[0] == mujoco.mjtJoint.mjJNT_FREE
-        positions += [f"{joint.name}_{axis}" for axis in FREE_POSITIONS] if free else [joint.name]
-        velocities += [f"{joint.name}_{axis}" for axis in FREE_VELOCITIES] if free else [f"{joint.name}_velocity"]
-    return (*positions, *velocities)
+    return tuple(_constants()["state_names"])
+
+
+@cache
+def _constants() -> dict[str, Any]:
+    """What `tools/hand_constants.py` took from the model."""
+    return json.loads(files("dextron_bench.world").joinpath("hand.json").read_text(encoding="utf-8"))
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

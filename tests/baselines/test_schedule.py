@@ -29,7 +29,7 @@ def test_the_paper_trains_for_a_million_frames_after_ten_thousand_random_ones():
 
 @pytest.mark.parametrize(("dur", "rows"), [(0.1, 3), (0.3, 9), (0.0, 0), (1.0, 32)])
 def test_the_demonstrations_of_a_batch_are_rounded_down(dur: float, rows: int):
-    """0.3 of 32 transitions are 9.6, of which the paper's code takes 9."""
+    """0.3 of 32 transitions are 9.6; the paper's code takes 9."""
     assert Rlil(dur=dur).demonstrated == rows
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from rerun.chunk import RrdReader
 
-from dextron_bench.catalogue import rerecording, selection
+from dextron_bench.catalogue import episodes, rerecording, selection
 from dextron_bench.catalogue.rerecording import Unplayable
 from dextron_bench.catalogue.selection import EpisodeFilter
 from dextron_bench.runs import execution, run_files
@@ -39,7 +39,7 @@ def play(folder: Path, record: int = 0, method: str = "exp") -> Path:
 
 
 def rerecorded(folder: Path, episode_filter: EpisodeFilter = ALL) -> list[Path]:
-    return rerecording.rerecord(selection.select(selection.episodes([folder]), episode_filter)[0])
+    return rerecording.rerecord(selection.select(episodes.read([folder]), episode_filter)[0])
 
 
 def digests(files: list[Path]) -> dict[str, str]:
@@ -65,7 +65,7 @@ def test_existing_recordings_are_not_made_again(tmp_path: Path):
     folder, reports = play(tmp_path, record=1), []
     before = {file.name: file.read_bytes() for file in (folder / "recordings").iterdir()}
     rerecording.rerecord(
-        selection.select(selection.episodes([folder]), ALL)[0],
+        selection.select(episodes.read([folder]), ALL)[0],
         lambda done, total, note="": reports.append((done, total)),
     )
     assert reports == [(1, 1)]
@@ -92,7 +92,7 @@ def test_a_recording_of_another_version_of_the_split_is_replaced(tmp_path: Path)
 def test_the_reason_of_a_failed_agent_is_kept(tmp_path: Path):
     (tmp_path / "late.py").write_text(LATE)
     folder = play(tmp_path, method=f"{tmp_path / 'late.py'}:Late")
-    table = selection.episodes([folder])
+    table = episodes.read([folder])
     assert set(table["failure"]) == {"action 2.0 is outside [-1, 1] at step 7"}
     (summary,) = rerecording.recording.summarise(rerecorded(folder, EpisodeFilter(split=("val",))))
     assert summary.properties["failure"] == "action 2.0 is outside [-1, 1] at step 7"
@@ -141,9 +141,9 @@ def test_other_physics_and_an_older_split_are_refused(tmp_path: Path):
 
 def test_the_folder_names_an_unfinished_run(tmp_path: Path):
     folder = play(tmp_path)
-    assert selection.run_identity(RunFolder(folder)) == {"method": "exp", "reaches": "synthetic", "seed": 2}
+    assert episodes.run_identity(RunFolder(folder)) == {"method": "exp", "reaches": "synthetic", "seed": 2}
     (folder / "result.json").unlink()
-    assert selection.run_identity(RunFolder(folder)) == {"method": "exp", "reaches": "synthetic", "seed": 2}
+    assert episodes.run_identity(RunFolder(folder)) == {"method": "exp", "reaches": "synthetic", "seed": 2}
     (folder / "config.json").write_text("{}")
     with pytest.raises(atomic.DamagedFile, match="it lacks 'reaches'"):
-        selection.run_identity(RunFolder(folder))
+        episodes.run_identity(RunFolder(folder))

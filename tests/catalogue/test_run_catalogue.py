@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dextron_bench.catalogue import run_catalogue, run_search
+from dextron_bench.catalogue.expressions import BadExpression
 from dextron_bench.catalogue.run_catalogue import Entry
 from dextron_bench.catalogue.run_search import BadSearch, RunFilter
 from dextron_bench.runs import annotations
@@ -85,6 +86,10 @@ def test_an_interrupted_run_did_not_fail(runs: Path):
         ({"tag": ("good",)}, ["mine"]),
         ({"tag": ("good", "bad")}, []),
         ({"since": "2026-03-01"}, ["learner", "mine"]),
+        ({"where": "near < 0.07"}, ["mine-near0.06"]),  # `learner` has no such setting.
+        ({"where": "return > 10 and 'good' in tags"}, ["mine"]),
+        ({"where": "state == 'done' and val == 3", "method": "l*"}, ["learner"]),
+        ({"where": "date < '2026-03-01'"}, ["mine-near0.06"]),
     ],
 )
 def test_filters(runs: Path, chosen: dict, expected: list[str]):
@@ -92,7 +97,7 @@ def test_filters(runs: Path, chosen: dict, expected: list[str]):
     ended(runs / "mine-near0.06/real/seed0", "2026-02-28T23:59:59+00:00")
     ended(runs / "mine/real/seed1", "2026-03-01T00:00:00+00:00")
     ended(runs / "learner/real/seed0", "2026-11-01T00:00:00+00:00")
-    assert names([entry for entry in run_catalogue.entries(runs) if RunFilter(**chosen).passes(entry)]) == expected
+    assert names(run_search.matching(run_catalogue.entries(runs), RunFilter(**chosen), "test")) == expected
 
 
 @pytest.mark.parametrize(
@@ -129,6 +134,19 @@ def test_settings_that_differ(runs: Path):
 def test_impossible_filters_are_refused(wrong: dict):
     with pytest.raises(BadSearch):
         RunFilter(**wrong)
+
+
+def test_an_unknown_column_of_runs_is_answered_with_the_columns(runs: Path):
+    with pytest.raises(BadExpression, match=r"there is no column 'nea'; did you mean near\? columns are name, reaches"):
+        run_search.matching(run_catalogue.entries(runs), RunFilter(where="nea == 1"), "test")
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [([True, False], [True, False]), ([1, None, 2.5], [1.0, np.nan, 2.5]), ([None, (2, 3)], ["", "(2, 3)"])],
+)
+def test_settings_of_runs_are_of_one_kind(values: list, expected: list):
+    np.testing.assert_array_equal(run_search._of_one_kind(values), expected)
 
 
 def test_a_name_that_no_run_or_several_have_is_refused(runs: Path):

@@ -9,9 +9,10 @@ import pandas as pd
 import pytest
 
 from dextron_bench.catalogue import selection
-from dextron_bench.catalogue.selection import BadFilter, EpisodeFilter, NoEpisodes
+from dextron_bench.catalogue.episodes import NoEpisodes
+from dextron_bench.catalogue.selection import BadFilter, EpisodeFilter
 
-COLUMNS = ["method", "reaches", "seed", "split", "row", "score", "length", "cause"]
+COLUMNS = ["method", "reaches", "seed", "split", "row", "return", "steps", "cause"]
 TABLE = pd.DataFrame(
     [
         ("bc", "real", 0, "test", 0, 20.0, 90, "solved"),
@@ -23,7 +24,7 @@ TABLE = pd.DataFrame(
         ("rl", "synthetic", 0, "test", 0, 20.0, 90, "solved"),
     ],
     columns=COLUMNS,
-).assign(success=lambda table: table["score"] == 20.0)
+).assign(success=lambda table: table["return"] == 20.0)
 
 
 @pytest.mark.parametrize(
@@ -42,6 +43,8 @@ TABLE = pd.DataFrame(
         ({"method": ("rl",), "reaches": ("real",)}, [4], 1),
         ({"seed": (1,)}, [3], 1),
         ({"row": (0,), "split": ("test",)}, [0, 4, 6], 3),
+        ({"where": "return < 20 and cause != 'too late'"}, [1, 3], 2),
+        ({"where": "seed == 0 and method == 'bc'", "failed": True, "worst": 1}, [2], 2),
     ],
 )
 def test_a_filter_selects_these_episodes(settings: dict[str, Any], rows: list[int], passing: int):

@@ -204,7 +204,7 @@ def test_an_impossible_comparison_is_one_line_on_stderr(here: Path, complaint: C
         ("good", "bad", "--split", "val"): "good, seed 0, has no split 'val' of real reaches; it has test",
         ("good", "more"): "it has val; other seeds have it: to compare one of them, give its folder",
         ("good", "bad", "--into", "difference.gif"): "no picture format '.gif'",
-        ("good",): "required",
+        ("good",): "B is missing",
         ("good", "bad", "short"): "played different versions of test of real reaches",
         ("good", "bad", "good", "--fail-if-worse"): "--into and --fail-if-worse need two methods, not more",
     }

@@ -45,7 +45,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def validate(*words: str, method: str = TOY, beside: Sequence[str] = ("exp",)) -> list[str]:
     preset = ["--preset", "smoke"] if method == TOY else []
-    return ["cross-validate", "--method", method, *preset, "--beside", *beside, "--quiet", *words]
+    return ["sweep", "cross-validate", "--method", method, *preset, "--beside", *beside, "--quiet", *words]
 
 
 def test_a_method_learns_without_each_subject_and_plays_its_settings(

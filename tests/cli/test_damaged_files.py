@@ -23,7 +23,7 @@ from tests.helpers import tiny_benchmark, tiny_training
 from tests.helpers.short_reaches import SOURCE
 
 TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--record", "0"]
-SHOW, BUILD = ["leaderboard", "show"], ["leaderboard", "build", "--runs", "runs", "--into", "board"]
+SHOW, BUILD = ["leaderboard", "show"], ["leaderboard", "build", "--runs", "runs", "--board", "board"]
 RUN, AGAIN = ["run", *TOY], ["run", *TOY, "--split", "val"]
 SEED = "runs/toy-0.1/synthetic/seed0"
 TRAINING = "runs/toy-0.1/synthetic/training-0"
@@ -110,7 +110,7 @@ def test_a_damaged_search_is_named(here: Path, complaint: Callable[..., str], co
     folder = here / "runs/mc/synthetic/seed0"
     folder.mkdir(parents=True)
     (folder / "search.json").write_text(content)
-    assert "runs/mc/synthetic/seed0" in complaint("mc", "--rows", "1", "--threads", "1")
+    assert "runs/mc/synthetic/seed0" in complaint("data", "mc", "--rows", "1", "--threads", "1")
 
 
 def test_a_name_that_is_not_utf_8_is_refused(here: Path, complaint: Callable[..., str]):
@@ -141,7 +141,7 @@ def test_a_hidden_folder_is_never_published(here: Path):
     for name in (".toy-0.1.part", "toy-0.1/.synthetic.part", "toy-0.1/synthetic/.seed0.part"):
         shutil.copytree(here / SEED, here / "board/results" / name / "synthetic" / "seed7")
         shutil.copytree(here / SEED, here / "board/results" / name / "seed7")
-    assert main.main(["leaderboard", "build", "--into", "board"]) == 0
+    assert main.main(["leaderboard", "build", "--board", "board"]) == 0
     assert (here / "board/table.csv").read_bytes() == before
 
 
@@ -172,4 +172,4 @@ def test_a_damaged_split_is_one_line(tiny_world: Path, complaint: Callable[..., 
     file = tiny_world / "data" / "splits-synthetic.parquet"
     file.write_bytes(file.read_bytes()[:100])
     assert "reinstall the package" in complaint("run", "--method", "nothing", "--split", "test", "--quiet")
-    assert "reinstall the package" in complaint("list")
+    assert "reinstall the package" in complaint("data", "splits")

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.cli import main
+from dextron_bench.cli.commands import COMMANDS, Group
 from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.recorded import release
 from tests.helpers.small_release import SmallRelease
@@ -141,8 +142,9 @@ def test_wrong_usage_is_code_2(arguments: list[str], capsys: pytest.CaptureFixtu
 
 
 def test_every_command_has_an_example(capsys: pytest.CaptureFixture[str]):
-    for name, command in main.COMMANDS.items():
-        for inner in [[member] for member in command[1]] if isinstance(command, tuple) else [[]]:
+    for name, command in COMMANDS.items():
+        group = command if isinstance(command, Group) else Group("", {}, command)
+        for inner in [*([[]] if group.command else []), *([member] for member in group.members)]:
             with pytest.raises(SystemExit) as caught:
                 main.main([name, *inner, "--help"])
             assert caught.value.code == 0
@@ -150,7 +152,7 @@ def test_every_command_has_an_example(capsys: pytest.CaptureFixture[str]):
 
 
 def test_help_imports_nothing_heavy():
-    script = "import sys; from dextron_bench.cli import main; main._union(main.COMMANDS); print(*sys.modules)"
+    script = "import sys; from dextron_bench.cli import main; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert not {"torch", "mujoco", "scipy", "pandas", "matplotlib", "rerun", "pyarrow"} & set(loaded)
 

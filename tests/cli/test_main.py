@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -45,10 +46,12 @@ def test_a_run_prints_the_folder_of_its_files(here: Path, capsys: pytest.Capture
     assert main.main(["run", "--method", "nothing", "--split", "open", "--quiet"]) == 0
     printed = capsys.readouterr().out
     assert "runs/nothing/synthetic/seed0" in printed
-    assert main.main(["list"]) == 0
-    printed = capsys.readouterr().out
-    assert "Replays the expert" in printed
-    assert "unseen-reach" in printed
+    assert main.main(["runs", "methods"]) == 0
+    assert "Replays the expert" in capsys.readouterr().out
+    assert main.main(["data", "splits"]) == 0
+    assert "unseen-reach" in capsys.readouterr().out
+    assert main.main(["runs", "list", "--columns", "run", "splits"]) == 0
+    assert re.search("nothing/synthetic.*open", capsys.readouterr().out)
 
 
 @pytest.mark.parametrize(
@@ -59,16 +62,16 @@ def test_a_run_prints_the_folder_of_its_files(here: Path, capsys: pytest.Capture
         (["run", "--split", "tset"], "no split 'tset' of 'synthetic' reaches; choose from val, test"),
         (["run", "--reaches", "real"], "no split 'test' of 'real' reaches; none ships"),
         (["data", "info", "--reaches", "real"], "data import --from"),
-        (["mc", "--share", "2/2", "--reaches", "synthetic"], "share 2/2 does not exist"),
-        (["mc", "--seed", "-1"], "--seed is -1; it must be 0 or more"),
+        (["data", "mc", "--share", "2/2", "--reaches", "synthetic"], "share 2/2 does not exist"),
+        (["data", "mc", "--seed", "-1"], "--seed is -1; it must be 0 or more"),
         (["run", "--seed", "0", "-1"], "--seed is -1; it must be 0 or more"),
         (["leaderboard", "serve", "--port", "65536"], "--port is 65536; it must be at most 65535"),
-        (["mc", "--threads", "2147483648"], "--threads is 2147483648; it must be at most 2147483647"),
+        (["data", "mc", "--threads", "2147483648"], "--threads is 2147483648; it must be at most 2147483647"),
         (["check", "reflex", "--memory", "nan"], "--memory is nan; it must be 0 or more"),
-        (["list", "a\0b"], "'a\\x00b' has a zero byte, which no name of a file or of anything else has"),
+        (["runs", "list", "a\0b"], "'a\\x00b' has a zero byte, which no name of a file or of anything else has"),
         (["view"], "runs does not exist"),
         (["view", "nowhere"], "nowhere does not exist"),
-        (["splits", "--reaches", "synthetic", "--database", "no.parquet", "--into", "new"], "no.json"),
+        (["data", "splits", "--reaches", "synthetic", "--database", "no.parquet", "--into", "new"], "no.json"),
     ],
 )
 def test_missing_files_and_names_are_one_line(
@@ -107,13 +110,13 @@ def test_a_leaderboard_without_results_explains_how_to_make_some(here: Path, cap
 
 
 def test_a_search_prints_json(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    from dextron_bench.experts import montecarlo
+    from dextron_bench.experts.search_work import SearchWork
 
     draws = pd.DataFrame(
         [("a", 0.0, 0.0, 0.0, 1.0, 0.5, 20.0, 90)], columns=[*tiny_benchmark.COLUMNS[1:7], "score", "length"]
     )
-    monkeypatch.setattr(montecarlo, "run", lambda *_, **__: draws)
-    assert main.main(["mc", "--json", "--quiet"]) == 0
+    monkeypatch.setattr(SearchWork, "run", lambda *_, **__: draws)
+    assert main.main(["data", "mc", "--json", "--quiet"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["kept"], summary["solved"]) == (1, 1)
 
@@ -161,18 +164,18 @@ def test_products_of_numpy_and_torch_use_one_thread_by_default():
     "words",
     [
         ["doctor"],
-        ["list"],
+        ["runs", "methods"],
         ["leaderboard", "show"],
         ["leaderboard", "build"],
         ["view"],
         ["recordings", "list"],
         ["recordings", "export"],
-        ["splits"],
-        ["mc"],
+        ["data", "splits"],
+        ["data", "mc"],
         ["run"],
         ["eval"],
         ["compare"],
-        ["plan"],
+        ["compare", "plan"],
         ["success", "data"],
         ["success", "train"],
         ["success", "eval"],

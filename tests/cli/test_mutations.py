@@ -23,7 +23,8 @@ import pandas as pd
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.experts import montecarlo
+from dextron_bench.experts.montecarlo import Search
+from dextron_bench.experts.search_work import SearchWork
 from dextron_bench.methods import weights
 from dextron_bench.training import learning_curve
 from dextron_bench.world.engine import Engine
@@ -37,7 +38,7 @@ LONGEST = 30  # [s] that a command may take.
 MOST_MEMORY = 2**30  # Bytes; the memory of this process, and of all that it starts, may grow by so much.
 TOY = ["--method", "tests.helpers.toy_learner:Toy", "--preset", "quick", "--quiet", "--record", "0"]
 RUN = ["run", *TOY]
-BUILD = ["leaderboard", "build", "--runs", "runs", "--into", "board"]
+BUILD = ["leaderboard", "build", "--runs", "runs", "--board", "board"]
 BASE = "runs/toy-0.1/synthetic"
 BUNDLE, RECORDING = "near-synthetic.zip", "runs/nothing/synthetic/seed0/recordings/test-0000.rrd"
 STRANGE: list[Any] = [None, "", "text", -1, 1e308, 10**30, float("nan"), True, [], {}, [[]], {"a": None}]
@@ -60,7 +61,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path
         with patch.context() as broken:
             broken.setattr(ToyTrainer, "advance", advance_until_the_fifth)
             assert main.main(RUN) == 2
-        montecarlo.run(SOURCE, SEARCH, made["search"], 1, Engine(12, 1))
+        SearchWork(SEARCH, made["search"], 1, SOURCE, Engine(12, 1)).run()
         patch.chdir(made["submission"])
         Path("near.py").write_text(AGENT)
         assert main.main(["submit", "near.py:Near", "--name", "near", "--seed", "0", "--quiet"]) == 0
@@ -70,7 +71,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Path
     tiny_benchmark.forget()
 
 
-SEARCH = montecarlo.Search("brief", seed=3, experts=3, block=4)
+SEARCH = Search("brief", seed=3, experts=3, block=4)
 real_advance = ToyTrainer.advance
 
 
@@ -90,7 +91,7 @@ def build() -> int:
 
 def search() -> int:
     try:
-        draws = montecarlo.run(SOURCE, SEARCH, Path(), 1, Engine(12, 1))
+        draws = SearchWork(SEARCH, Path(), 1, SOURCE, Engine(12, 1)).run()
     except Exception as error:
         return main.explain(error)[0]
     draws.to_csv("draws.csv")

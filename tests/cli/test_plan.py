@@ -1,4 +1,4 @@
-"""`dextron-bench plan` on invented results."""
+"""`dextron-bench compare plan` on invented results."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import pytest
 from dextron_bench.cli import main
 from dextron_bench.runs import result_files
 from tests.cli.test_compare import ROWS, write
+
+PLAN = ["compare", "plan", "fixed", "trained"]
 
 
 @pytest.fixture
@@ -27,7 +29,10 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_more_seeds_need_fewer_settings(here: Path, capsys: pytest.CaptureFixture[str]):
-    assert main.main(["plan", "fixed", "trained", "--difference", "5", "--seeds", "5", "20", "80", "--json"]) == 0
+    assert (
+        main.main(["compare", "plan", "fixed", "trained", "--difference", "5", "--seeds", "5", "20", "80", "--json"])
+        == 0
+    )
     result = json.loads(capsys.readouterr().out)
     settings = [plan["settings"] or np.inf for plan in result["plans"]]
     assert settings == sorted(settings, reverse=True)
@@ -36,7 +41,10 @@ def test_more_seeds_need_fewer_settings(here: Path, capsys: pytest.CaptureFixtur
 
 
 def test_the_text_names_what_the_plan_is_made_from(here: Path, capsys: pytest.CaptureFixture[str]):
-    assert main.main(["plan", "fixed", "trained", "--measure", "return", "--difference", "0.1", "--seeds", "2"]) == 0
+    assert (
+        main.main(["compare", "plan", "fixed", "trained", "--measure", "return", "--difference", "0.1", "--seeds", "2"])
+        == 0
+    )
     printed = capsys.readouterr().out
     assert "to show a difference of 0.1 in return between fixed and trained" in printed
     assert "more seeds are needed" in printed
@@ -44,6 +52,6 @@ def test_the_text_names_what_the_plan_is_made_from(here: Path, capsys: pytest.Ca
 
 
 def test_wrong_use_is_one_line(here: Path, complaint: Callable[..., str]):
-    assert "--difference must be above 0" in complaint("plan", "fixed", "trained", "--difference", "0")
-    assert "--seeds at least 2" in complaint("plan", "fixed", "trained", "--seeds", "1")
-    assert "no result of 'other'" in complaint("plan", "fixed", "other")
+    assert "--difference must be above 0" in complaint("compare", "plan", "fixed", "trained", "--difference", "0")
+    assert "--seeds at least 2" in complaint("compare", "plan", "fixed", "trained", "--seeds", "1")
+    assert "no result of 'other'" in complaint("compare", "plan", "fixed", "other")

@@ -56,6 +56,7 @@ def test_recordings_are_selected_in_the_words_of_view(
     assert [episode[:2] for episode in episodes] == [("exp", 0), ("exp", 1), ("nothing", 0), ("nothing", 1)]
     assert listed() == episodes
     assert listed("--cause", "solved", "--row", "1") == [("exp", 1, "solved")]
+    assert listed("--where", "success and row == 1") == [("exp", 1, "solved")]
     assert listed("--worst", "1") == episodes[2:3]
     assert listed("--best", "1") == episodes[:1]
     shutil.copytree("runs/nothing/synthetic/seed0/recordings", "elsewhere")

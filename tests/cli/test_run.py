@@ -42,7 +42,7 @@ def test_a_run_trains_all_seeds_together(
     assert (training["seeds"], training["epochs"], training["best_epoch"], training["frames"]) == ([0, 1], 2, 2, 40)
     assert training["sha256"] == hashing.sha256(base / "seed1" / "weights.safetensors")
     assert [point["epoch"] for point in json.loads((base / "seed1" / "curve.json").read_text())["points"]] == [2]
-    assert main.main(["list"]) == 0
+    assert main.main(["runs", "list"]) == 0
     assert "toy-0.3" in capsys.readouterr().out
 
 
@@ -86,7 +86,7 @@ def test_a_dry_run_prints_what_is_left_and_writes_nothing(
     assert main.main([*run(TOY, "--breaks", "2", "--every", "1")]) == 2
     train, _ = printed_json(*run(TOY, "--breaks", "2", "--every", "1"), "--dry-run")
     assert train["left"] == "1 of 2 epochs"
-    assert main.main(["list"]) == 0
+    assert main.main(["runs", "list"]) == 0
     assert "1 of 2 epochs" in capsys.readouterr().out
     assert main.main(words[:-1]) == 2  # The folder has a run with other settings.
     assert main.main([*run(TOY, "--runs", "other")]) == 0
@@ -108,11 +108,11 @@ def test_flags_of_a_method_are_in_the_help(here: Path, capsys: pytest.CaptureFix
     ("words", "expected"),
     [
         (["--nosuch", "1"], "unknown flag --nosuch"),
-        (["--rate", "x"], "Error parsing --rate: could not convert string to float: 'x'; see `dextron-bench run --h"),
+        (["--rate", "x"], "--rate: 'x' is not a number; see `dextron-bench run --h"),
         (["--rate", "-1"], "--rate is -1; a learning rate is positive"),
         (
             ["--preset", "no"],
-            "invalid choice 'no' for argument '--preset'. Expected one of ('paper', 'quick', 'smoke')",
+            "--preset: 'no' is not one of paper, quick, smoke; see",
         ),
         (["--split", "tset"], "no split 'tset' of 'synthetic' reaches"),
         (["--breaks", "1"], "epoch 1 of method 'toy-0.1' raised ZeroDivisionError: toys break"),

@@ -178,7 +178,7 @@ def test_a_share_that_was_killed_leaves_no_half_piece(here: Path, monkeypatch: p
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(evaluation_job.shares.Work, "write", killed)
+        patch.setattr(evaluation_job.EvaluationJob, "complete", killed)
         assert main.main([*words, "--share", "0/1"]) == 130
     assert [path.name for path in (here / "runs" / PIECES).iterdir()] == ["test-0000-0000.parquet"]
     play(words, "--share", "0/1")
@@ -206,6 +206,19 @@ def test_a_share_and_a_merge_at_once_are_refused(here: Path, complaint: Callable
     assert "give one of both" in complaint(*RUN, "--share", "0/2", "--merge")
 
 
+def test_a_setting_of_a_method_cannot_hide_a_flag_of_the_group(here: Path, complaint: Callable[..., str]):
+    text = constant_agent(here, "0.1").replace(":Constant", ":Mine")
+    (here / "constant.py").write_text(
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\nclass Mine:\n    merge: int = 1\n    name = 'mine'\n"
+        "    def agent(self, seed): return self\n"
+    )
+    for command in ("run", "eval"):
+        assert f"has a setting 'merge', but {command!r} already has a flag of this name" in complaint(
+            command, "--method", text
+        )
+
+
 def test_a_share_trains_nothing(here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]):
     tiny_training.install(tiny_training.write(here / "data"), monkeypatch.setattr)
     words = ("run", "--method", TOY, "--preset", "smoke", "--quiet", "--record", "0", "--split", "test")
@@ -231,7 +244,7 @@ def test_a_share_trains_nothing(here: Path, monkeypatch: pytest.MonkeyPatch, com
 def test_shares_verify_a_board_as_one_process_does(here: Path, capsys: pytest.CaptureFixture[str]):
     for method in ("exp", "nothing"):
         play(("run", "--method", method, "--quiet", "--record", "0"))
-    assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
+    assert main.main(["leaderboard", "build", "--runs", "runs", "--board", "board"]) == 0
     result = here / "board/results/nothing/synthetic/seed0/result.json"
     result.write_text(result.read_text().replace("0.0", "1.0", 1))
     words = ["leaderboard", "verify", "--all", "--board", "board", "--quiet", "--threads", "1"]

@@ -19,13 +19,14 @@ from tests.helpers import tiny_benchmark
 ROOT = Path(__file__).parents[2]
 TABLES = """
 import sys
-from dextron_bench.cli import list, main
+from dextron_bench.cli import main
+from dextron_bench.cli.runs import methods
 from dextron_bench.cli.support import output
 def call(self):
     for _ in range(2):
         output.print_table("a table \\u2013 with a dash", ["a", "b"], [[1, "\\u00e9"]])
     return 0
-list.List.__call__ = call
+methods.Methods.__call__ = call
 sys.exit(main.main())
 """
 LOUD = """
@@ -43,6 +44,7 @@ class Mine:
         return -states[:, :1] ** 0
 """
 LATIN = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+METHODS = ["runs", "methods"]
 
 
 def start(*words: str, code: str = TABLES, shell: str = "", **environment: str) -> subprocess.CompletedProcess[bytes]:
@@ -56,7 +58,7 @@ def start(*words: str, code: str = TABLES, shell: str = "", **environment: str) 
     )
 
 
-@pytest.mark.parametrize("words", [["list"], ["--help"], ["run", "--help"], ["--version"], ["list", "--json"]])
+@pytest.mark.parametrize("words", [METHODS, ["--help"], ["run", "--help"], ["--version"], [*METHODS, "--json"]])
 def test_a_reader_that_leaves_is_no_error(words: list[str]):
     """Rich ends the process with code 1 if it is the first to notice, and Python at its end with code 120."""
     inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
@@ -67,24 +69,27 @@ def test_a_reader_that_leaves_is_no_error(words: list[str]):
         assert process.stderr
         process.stdout.close()
         errors = process.stderr.read()
-    if words == ["list", "--json"]:
-        assert (errors.count(b"\n"), process.returncode) == (1, 2)  # `list` has no JSON: a wrong flag stays one.
+    if words == ["runs", "methods", "--json"]:
+        assert (errors.count(b"\n"), process.returncode) == (
+            1,
+            2,
+        )  # It has no JSON: a wrong flag stays one.
     else:
         assert (errors, process.returncode) == (b"", 0)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is full")
 def test_a_full_disk_behind_stdout_is_one_line():
-    done = start("list", shell=">/dev/full")
+    done = start("runs", "methods", shell=">/dev/full")
     assert (done.returncode, done.stderr) == (2, b"dextron-bench: No space left on device\n")
-    assert start("list", shell="2>/dev/full").returncode == 0
+    assert start("runs", "methods", shell="2>/dev/full").returncode == 0
     assert start("nosuch", shell="2>/dev/full").returncode == 2
 
 
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_closed_stream_is_one_that_leads_nowhere(closed: str, tmp_path: Path):
     """The next file that is opened would otherwise get its number, and what is printed."""
-    done = start("list", shell=closed)
+    done = start("runs", "methods", shell=closed)
     assert (done.returncode, done.stderr) == (0, b"")
     assert start("nosuch", shell=closed).returncode == 2
     done = start("runs", "rm", "x", "--runs", str(tmp_path), shell=closed)
@@ -92,12 +97,12 @@ def test_a_closed_stream_is_one_that_leads_nowhere(closed: str, tmp_path: Path):
     assert b"Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("words", [["list"], ["--help"], ["run", "--help"], ["runs", "list", "--help"]])
+@pytest.mark.parametrize("words", [["runs", "methods"], ["--help"], ["run", "--help"], ["runs", "list", "--help"]])
 def test_a_locale_without_utf_8_gets_escapes_and_no_error(words: list[str]):
     done = start(*words, **LATIN)
     assert (done.returncode, done.stderr) == (0, b"")
     done.stdout.decode("ascii")
-    if words == ["list"]:
+    if words == ["runs", "methods"]:
         assert b"a table \\u2013 with a dash" in done.stdout
         assert b"| 1 | \\xe9 |" in done.stdout
 
@@ -110,7 +115,7 @@ def test_a_name_that_the_locale_lacks_is_blamed_on_the_locale():
 
 @pytest.mark.parametrize("more", [{"COLUMNS": "40"}, {"COLUMNS": "abc"}, {"TERM": "dumb"}, {"NO_COLOR": "1"}])
 def test_the_size_and_kind_of_a_terminal_change_no_exit_code(more: dict[str, str]):
-    for words in (["list"], ["--help"]):
+    for words in (["runs", "methods"], ["--help"]):
         done = start(*words, **more)
         assert (done.returncode, done.stderr) == (0, b"")
 

@@ -156,7 +156,7 @@ def test_a_training_is_stopped_early(here: Path, monkeypatch: pytest.MonkeyPatch
         (["--grid", "far=1"], "the method has no setting 'far'; it has near, gain"),
         (["--grid", "near=0.1..0.2"], "a grid needs values"),
         (["--grid", "near='1"], "No closing quotation"),
-        (["--grid", "near=x"], "could not convert string to float: 'x'"),
+        (["--grid", "near=x"], "--near: 'x' is not a number"),
         (["--grid", "near=0.1", "near=0.2"], "write each setting once"),
         (["--grid", "near=0.1", "--near", "0.3"], "--near has a value of its own"),
         (["--search", "near=0.2..0.1"], "needs finite ends, the smaller one first"),

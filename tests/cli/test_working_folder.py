@@ -23,13 +23,15 @@ MORE = {  # Words with which a command starts processes, or reads what lies in t
     "view": (["one.rrd", "--web", "--port", "0"], ["--live", "one.rrd"]),
     "run": (
         ["--method", "rlil", "--preset", "smoke", "--split", "val", "--tracker", "tensorboard"],
-        ["--method", "nothing", "--split", "val", "--record", "2"],
+        ["--method", "nothing", "--split", "val", "--record", "24", "--threads", "2"],  # In two processes.
     ),
     "eval": (["--policies", "nosuch", "--quiet"],),
     "check": (["mine.py:Mine"],),
     "leaderboard": (["build"], ["serve", "--port", "0"]),
     "recordings": (["list", "one.rrd"], ["export", "one.rrd", "--into", "one.gif"]),
-    "list": ([],),
+    "runs": (["list"], ["methods"]),
+    "sweep": ([], ["cross-validate", "--method", "nothing"]),
+    "data": (["splits"], ["mc"]),
     "doctor": ([],),
 }
 AGENT = """

@@ -25,7 +25,7 @@ import pytest
 import dextron_bench
 from dextron_bench.catalogue import mlflow_export
 from dextron_bench.cli import main
-from dextron_bench.cli.commands import COMMANDS
+from dextron_bench.cli.commands import COMMANDS, Group
 from dextron_bench.cli.support import method_flags, usage
 from dextron_bench.cli.support.exit_codes import BUG
 from dextron_bench.methods.isolation import sandbox
@@ -116,10 +116,12 @@ def _accept(*_: object) -> None:
 def commands() -> Iterator[tuple[tuple[str, ...], Any]]:
     """The words of each command, and its class."""
     for name, command in COMMANDS.items():
-        if isinstance(command, tuple):
-            yield from (((name, member), cls) for member, cls in command[1].items())
-        else:
+        if not isinstance(command, Group):
             yield (name,), command
+            continue
+        if command.command:
+            yield (name,), command.command
+        yield from (((name, member), cls) for member, cls in command.members.items())
 
 
 def is_positional(hint: Any) -> bool:
@@ -130,13 +132,16 @@ def is_positional(hint: Any) -> bool:
 def wrong_words(command: tuple[str, ...], cls: Any) -> Iterator[tuple[str, ...]]:
     """The words of a command with one wrong value each, and plausible ones for what it needs."""
     start = (*command, *ALSO.get(command[0], ()))
-    if command[0] in method_flags.COMMANDS:
-        cls = method_flags.with_method_settings(start, cls)
+    cls = method_flags.with_method_settings(command, start[len(command) :], cls)
     hints = typing.get_type_hints(cls, include_extras=True)
     needed: dict[str, tuple[str, ...]] = {}
     given: list[tuple[str, str]] = []
     for field in dataclasses.fields(cls):
-        names = [""] if is_positional(hints[field.name]) else usage._flags_of(field, hints[field.name])
+        names = (
+            [""]
+            if is_positional(hints[field.name])
+            else [option.name for option in usage._options_of(field, hints[field.name])]
+        )
         if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
             needed[field.name] = (names[0], "folder") if names[0] else ("folder",)
         given += [(field.name, name) for name in names]

@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.cluster import ray_cluster, trainings, worker
-from dextron_bench.experts import montecarlo
+from dextron_bench.cluster import pieces, ray_cluster, trainings, worker
+from dextron_bench.cluster.tasks import OtherVersion
+from dextron_bench.experts import montecarlo, search_work
+from dextron_bench.storage.pieces import Place
 from dextron_bench.success import generation
 from tests.cli.test_shares import contents, on_machine
 from tests.cli.test_sweep import AGENT
@@ -55,7 +57,7 @@ def play(*words: str | Path) -> None:
 
 
 def test_a_search_and_a_run_have_the_same_bytes(here: Path):
-    for words in (("mc", "--rows", "3"), ("run", "--method", "exp", "--split", "test")):
+    for words in (("data", "mc", "--rows", "3"), ("run", "--method", "exp", "--split", "test")):
         play(*words, "--quiet", "--threads", "1", "--runs", "whole")
         play(*words, "--quiet", *CLUSTER)
     files = contents(here / "whole")
@@ -83,6 +85,24 @@ def test_a_training_goes_on_task_by_task(here: Path, monkeypatch: pytest.MonkeyP
     assert tiny_training.contents(here / "runs") == tiny_training.contents(here / "whole")
 
 
+def test_an_evaluation_of_weights_in_a_file_has_the_same_bytes(here: Path):
+    """The weights and the file of the method go to the node, below its own folder of runs."""
+    play("run", "--method", TOY, "--preset", "smoke", "--quiet", "--split", "val", "--record", "0", "--threads", "1")
+    weights = ("--weights", here / "runs/toy-0.1/synthetic/seed0/weights.safetensors")
+    words = ("eval", "--method", TOY, "--preset", "smoke", "--quiet", "--split", "test", *weights)
+    play(*words, "--threads", "1", "--runs", "whole")
+    play(*words, "--runs", "clustered", *CLUSTER)
+    assert contents(here / "clustered") == contents(here / "whole")
+
+
+def test_a_piece_of_another_version_of_the_work_is_not_played(here: Path):
+    """The node has the same installation, and a search of another seed, so its blocks would be other ones."""
+    work = search_work.open_work(Place(here, here / "mc", 1), montecarlo.Search(), 3)
+    arguments = (here, 1, work.recipe("000000"), "mc", "000000", {"search": {"seed": 1}})
+    with pytest.raises(OtherVersion, match="another version of block 000000: it differs in search; install the same"):
+        pieces.play_piece(*arguments)
+
+
 def test_a_data_set_has_the_same_bytes(here: Path):
     words = ("success", "data", "--rows", "300", "--quiet")
     play(*words, "--threads", "1", "--runs", "whole")
@@ -106,7 +126,7 @@ def test_a_submission_is_the_same_bundle(here: Path, complaint: Callable[..., st
 def test_a_board_is_verified_as_without_a_cluster(here: Path, capsys: pytest.CaptureFixture[str]):
     for method in ("exp", "nothing"):
         play("run", "--method", method, "--quiet", "--record", "0")
-    play("leaderboard", "build", "--runs", "runs", "--into", "board")
+    play("leaderboard", "build", "--runs", "runs", "--board", "board")
     result = here / "board/results/nothing/synthetic/seed0/result.json"
     result.write_text(result.read_text().replace("0.0", "1.0", 1))
     words = ["leaderboard", "verify", "--all", "--board", "board", "--quiet", "--threads", "1"]

@@ -39,7 +39,7 @@ def play(*words: str | Path) -> None:
 def test_the_bytes_are_the_same_without_a_cluster_and_on_one_two_and_four_nodes(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    search = ("mc", "--rows", "2", "--quiet", "--threads", "1")
+    search = ("data", "mc", "--rows", "2", "--quiet", "--threads", "1")
     play(*RUN, "--runs", "whole")
     play(*search, "--runs", "whole")
     files, printed = contents(here / "whole"), capsys.readouterr().out
@@ -76,7 +76,7 @@ def test_a_training_and_a_search_go_on_when_their_nodes_are_lost(
     The search loses the node of its first block, which is all that it needs.
     """
     training = (*RUN[:2], TOY, *RUN[3:], "--preset", "quick", "--split", "val", "--seed", "0", "3", "--record", "0")
-    search = ("mc", "--rows", "2", "--quiet", "--threads", "1")
+    search = ("data", "mc", "--rows", "2", "--quiet", "--threads", "1")
     monkeypatch.setattr(trainings, "SECONDS", 0.0)
     play(*training, "--runs", "whole")
     play(*search, "--runs", "whole-search")
@@ -97,7 +97,7 @@ def test_a_verification_goes_on_when_its_node_is_lost(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     play("run", "--method", "exp", "--quiet", "--record", "0", "--threads", "1")
-    play("leaderboard", "build", "--runs", "runs", "--into", "board")
+    play("leaderboard", "build", "--runs", "runs", "--board", "board")
     words = ("leaderboard", "verify", "--all", "--board", "board", "--quiet")
     capsys.readouterr()
     play(*words, "--threads", "1")

@@ -93,7 +93,7 @@ def test_files_are_written_in_order_until_one_has_other_bytes(tmp_path: Path):
 
 def test_the_flag_is_checked_before_any_work(complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(ray_cluster.importlib.util, "find_spec", lambda name: object())
-    for words in (["mc"], ["run"], ["success", "data"], ["submit", "reflex", "--name", "x"]):
+    for words in (["data", "mc"], ["run"], ["success", "data"], ["submit", "reflex", "--name", "x"]):
         assert "'nearby' is none of local, auto and ray://HOST:PORT" in complaint(*words, "--cluster", "nearby")
         assert "leave out --share and --merge" in complaint(*words, "--cluster", "local", "--merge")
     assert "need --all" in complaint("leaderboard", "verify", "some.zip", "--cluster", "local")
@@ -101,7 +101,7 @@ def test_the_flag_is_checked_before_any_work(complaint: Callable[..., str], monk
 
 def test_without_ray_the_flag_says_what_to_install(complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(ray_cluster.importlib.util, "find_spec", lambda name: None)
-    for words in (["mc"], ["run"], ["success", "data"], ["leaderboard", "verify", "--all"]):
+    for words in (["data", "mc"], ["run"], ["success", "data"], ["leaderboard", "verify", "--all"]):
         text = complaint(*words, "--cluster", "local")
         assert text == "dextron-bench: --cluster needs Ray: `pip install 'dextron-bench[cluster]'`\n"
 
@@ -152,7 +152,7 @@ def test_a_large_task_fits_no_small_node(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_help_is_quick_because_it_imports_no_ray(capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit):
-        main.main(["mc", "--help"])
+        main.main(["data", "mc", "--help"])
     assert "--cluster local|auto|ray://HOST:PORT" in " ".join(capsys.readouterr().out.split())
 
 

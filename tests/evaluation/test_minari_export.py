@@ -186,7 +186,7 @@ def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], c
     run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--quiet", "--record", "0"]
     assert main.main(run) == 0
     weights = "runs/bc-smoke/synthetic/seed0/weights.safetensors"
-    assert main.main([*words, "--weights", weights, "--rows", "1", "--author", "A. Person"]) == 0
+    assert main.main([*words, "--policies", weights, "--rows", "1", "--author", "A. Person"]) == 0
     about = minari.MinariDataset("sets/dextron/synthetic-test-policies-v0/data").storage.metadata
     assert about["author"] == {"A. Person"}
     assert about["dextron_bench"]["players"][0]["sha256"] == hashing.sha256(here / weights)

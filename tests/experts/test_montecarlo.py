@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,9 @@ from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts import blocks, database, montecarlo, outcomes, policies
 from dextron_bench.experts.blocks import Tally
 from dextron_bench.experts.montecarlo import Search
+from dextron_bench.experts.search_work import SearchWork
 from dextron_bench.reaches import setting
-from dextron_bench.storage import folder_config, provenance, shares, tables
+from dextron_bench.storage import block_work, folder_config, provenance, shares, tables
 from dextron_bench.storage.shares import Share
 from dextron_bench.world.engine import Engine
 from tests.helpers.short_reaches import SOURCE
@@ -29,11 +29,15 @@ SMALL = Search("brief", seed=3, experts=3, block=4)
 
 
 def search(folder: Path, rows: int, slots: int = 12, threads: int = 1) -> pd.DataFrame:
-    return montecarlo.run(SOURCE, SMALL, folder, rows, Engine(slots, threads))
+    return SearchWork(SMALL, folder, rows, SOURCE, Engine(slots, threads)).run()
+
+
+def work_in(folder: Path, rows: int = 3, search: Search = SMALL) -> SearchWork:
+    return SearchWork(search, folder, rows, SOURCE, Engine(12, 1))
 
 
 def search_share(folder: Path, text: str, rows: int = 3) -> int:
-    return montecarlo.run_share(SOURCE, SMALL, folder, rows, Engine(12, 1), Share.parse(text))
+    return int(work_in(folder, rows).play_share(Share.parse(text)).removesuffix(" blocks"))
 
 
 @pytest.fixture
@@ -103,7 +107,7 @@ def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: P
         for index in range(of):
             shutil.copytree(tmp_path / f"part{index}", merged, dirs_exist_ok=True)
         with suppress(shares.MissingPieces):
-            montecarlo.check_complete(SMALL, merged, rows=3)
+            work_in(merged).check_complete()
             break
     monkeypatch.setattr(outcomes, "play_blocks", nothing_left)
     database.save(search(merged, rows=3), SOURCE, SMALL, merged, "experts")
@@ -115,18 +119,20 @@ def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: P
 @pytest.mark.usefixtures("quick_episodes")
 def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
     with pytest.raises(shares.MissingPieces, match=r"lacks the blocks from 000000 on: .* have 0 of 3 rows"):
-        montecarlo.check_complete(SMALL, tmp_path, rows=3)
+        work_in(tmp_path).check_complete()
     count = search_share(tmp_path, "1/2")
     with pytest.raises(shares.MissingPieces, match=rf"lacks {count} of {2 * count} pieces: block 000000"):
-        montecarlo.check_complete(SMALL, tmp_path, rows=3)
+        work_in(tmp_path).check_complete()
 
 
 @pytest.mark.usefixtures("quick_episodes")
 def test_a_block_of_a_share_that_differs_from_the_stored_one_is_named(tmp_path: Path):
     search_share(tmp_path, "0/2", rows=1)
     search(tmp_path, rows=1)
-    draws = pd.read_parquet(blocks.block_file(tmp_path, 0)).assign(score=0.5)
-    blocks.write_piece(asdict(SMALL), tmp_path, 0, draws)
+    work = work_in(tmp_path, 1)
+    draws = pd.read_parquet(work.block_file(0)).assign(score=0.5)
+    tables.write(file := work.file("000000", ".parquet"), draws, compression="zstd")
+    work.complete("000000", [file])
     with pytest.raises(blocks.DamagedBlock, match=r"it differs from .*pieces/000000\.parquet, which is"):
         search(tmp_path, rows=1)
 
@@ -137,7 +143,7 @@ def test_two_machines_are_named_in_the_summary(tmp_path: Path, monkeypatch: pyte
         monkeypatch.setattr(provenance, "collect", lambda physics, name=machine: {"machine": {"cpu": name}})
         search_share(tmp_path, text)
     monkeypatch.setattr(provenance, "collect", lambda physics: {"machine": {"cpu": "of the merge"}})
-    montecarlo.check_complete(SMALL, tmp_path, rows=3)
+    work_in(tmp_path).check_complete()
     _, about = database.save(search(tmp_path, rows=3), SOURCE, SMALL, tmp_path, "experts")
     makers = about["provenance"]
     assert [makers["machine"]["cpu"], *(maker["machine"]["cpu"] for maker in makers["others"])] == ["large", "small"]
@@ -155,7 +161,8 @@ def test_outcomes_equal_the_outcomes_of_experts_played_one_by_one(tmp_path):
 
 def test_a_search_stops_at_the_first_block_that_reaches_the_rows():
     done = {0: Tally(1, 8, 3, 2), 1: Tally(1, 8, 0, 0), 2: Tally(1, 8, 5, 4), 4: Tally(1, 8, 9, 9)}
-    assert [blocks.last_block_needed(done, rows) for rows in (1, 2, 3, 6, 7)] == [0, 0, 2, 2, None]
+    solved = {number: tally.solved for number, tally in done.items()}
+    assert [block_work.last_needed(solved, rows) for rows in (1, 2, 3, 6, 7)] == [0, 0, 2, 2, None]
     assert blocks.total(done) == Tally(4, 32, 17, 15)
 
 
@@ -166,18 +173,18 @@ def test_a_search_continues_from_the_kept_rows_of_a_database(tmp_path):
 
     first = search(tmp_path / "first", rows=1)
     count = len(first) // (SMALL.block * SMALL.experts)
-    montecarlo.restore(SOURCE, SMALL, tmp_path / "second", kept(first), count)
+    work_in(tmp_path / "second").restore(kept(first), count)
     whole = search(tmp_path / "first", rows=3)
     pd.testing.assert_frame_equal(kept(search(tmp_path / "second", rows=3)), kept(whole))
     with pytest.raises(folder_config.FolderMismatch, match="row 0 of the database"):
-        montecarlo.restore(SOURCE, Search("brief", 4, 3, 4), tmp_path / "other", kept(first), count)
+        work_in(tmp_path / "other", search=Search("brief", 4, 3, 4)).restore(kept(first), count)
 
 
 @pytest.mark.usefixtures("quick_episodes")
 def test_a_folder_holds_one_search(tmp_path):
     search(tmp_path, rows=1)
     with pytest.raises(folder_config.FolderMismatch, match="holds another search"):
-        montecarlo.run(SOURCE, Search("brief", seed=4, experts=3, block=4), tmp_path, 1, Engine(12, 1))
+        work_in(tmp_path, 1, Search("brief", seed=4, experts=3, block=4)).run()
 
 
 @pytest.mark.usefixtures("quick_episodes")

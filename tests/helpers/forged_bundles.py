@@ -16,10 +16,12 @@ import pytest
 
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.runs import result_files, run_files
+from dextron_bench.splits.fresh_settings import FreshSettings
 from dextron_bench.storage import hashing
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle, playing, verification
 from dextron_bench.submissions import entry as submission_entry
+from dextron_bench.submissions.seed_check import Playing
 from dextron_bench.submissions.verdict import Verdict
 from tests.helpers import tiny_benchmark
 
@@ -76,8 +78,8 @@ class Forgery:
         table = pd.read_parquet(RunFolder(self.seed).episodes)
         self.json("seed0/result.json", lambda result: result.update(splits=result_files.scores_by_split(table)))
 
-    def checked(self, **options: Any) -> Verdict:
-        """Packs the bundle with correct hashes, and verifies it."""
+    def checked(self, *, rerun: bool = False, fresh: FreshSettings | None = None, **how: Any) -> Verdict:
+        """Packs the bundle with correct hashes, and verifies it; `how` are fields of `Playing`."""
         manifest = json.loads((self.folder / bundle.MANIFEST).read_text())
         files = {str(path.relative_to(self.folder)): path for path in self.folder.rglob("*") if path.is_file()}
         hashes = {name: hashing.sha256(path) for name, path in files.items() if name != bundle.MANIFEST}
@@ -88,7 +90,9 @@ class Forgery:
                 archive.write(files[name], name)
         into = self.folder.with_name("again")
         shutil.rmtree(into, ignore_errors=True)
-        return verification.verify(into, bundle.unpack(packed, into), self.board, threads=1, **options)
+        return verification.verify(
+            into, bundle.unpack(packed, into), self.board, Playing(threads=1, **how), rerun, fresh
+        )
 
 
 def play(here: Path) -> Path:

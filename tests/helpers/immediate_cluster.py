@@ -22,7 +22,7 @@ class ImmediateCluster(RayCluster):
     """Does tasks one after another. `losing` says by name how often a task loses its node; `order` has all tries."""
 
     def __init__(self, address: str, runs: Path, threads: int = 0) -> None:
-        self._runs, self._under_way = runs, {}
+        self.runs, self._under_way = runs, {}
         self.threads, self.losses, self.room = 1, 0, 2
         self.order: list[str] = []
         self.losing: dict[str, int] = {}

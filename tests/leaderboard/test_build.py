@@ -34,7 +34,7 @@ def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def build(*words: str) -> int:
-    return main.main(["leaderboard", "build", "--into", "board", *words])
+    return main.main(["leaderboard", "build", "--board", "board", *words])
 
 
 def test_results_curves_and_weights_are_copied_unchanged(here: Path):
@@ -83,7 +83,7 @@ def test_an_unfinished_run_is_not_published(here: Path, complaint: Callable[...,
         result = json.loads(file.read_text())
         result["splits"].pop("unseen-reach")
         file.write_text(json.dumps(result))
-    line = complaint("leaderboard", "build", "--runs", "runs", "--into", "board")
+    line = complaint("leaderboard", "build", "--runs", "runs", "--board", "board")
     assert "no run in runs holds all splits that rank methods" in line
     assert not (here / "board").exists()
 

@@ -36,7 +36,7 @@ def board(tiny_world: Path) -> Path:
     """A board with two baselines on a tiny benchmark."""
     for method in METHODS:
         assert main.main(["run", "--method", method, "--quiet"]) == 0
-    assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
+    assert main.main(["leaderboard", "build", "--runs", "runs", "--board", "board"]) == 0
     return tiny_world / "board"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dextron_bench import recording
-from dextron_bench.catalogue import selection
+from dextron_bench.catalogue import episodes
 from dextron_bench.cli import main
 from dextron_bench.leaderboard import highlights
 from dextron_bench.success import network
@@ -27,13 +27,20 @@ def test_each_method_has_its_shortest_episodes_and_each_kind_its_clearest(runs: 
     names = chosen["name"].tolist()
     assert names[:2] == ["exp-success", "nothing-failure"]
     assert "case-expert" in names
-    table = selection.episodes([runs])
-    shortest = table[table["method"] == "exp"]["length"].min()
-    assert chosen["length"].iloc[0] == shortest
+    table = episodes.read([runs])
+    shortest = table[table["method"] == "exp"]["steps"].min()
+    assert chosen["steps"].iloc[0] == shortest
     files = highlights.make(chosen, runs / "chosen")
     assert [file.stem for file in files] == names
-    for file, score in zip(files, chosen["score"], strict=True):
+    for file, score in zip(files, chosen["return"], strict=True):
         assert recording.read(file).episode.score == score
+
+
+def test_exemplars_are_of_any_method_and_outcomes_of_the_methods_that_are_named(runs: Path):
+    every, few = (highlights.choose(runs, ["synthetic"], "test", 100, methods) for methods in ((), ("nothing",)))
+    assert few["name"].tolist() == [name for name in every["name"] if name != "exp-success"]
+    assert few["name"].iloc[0] == "nothing-failure"
+    assert "case-expert" in set(few["name"])
 
 
 def test_the_command_copies_the_recordings(runs: Path, capsys: pytest.CaptureFixture[str]):
@@ -54,5 +61,5 @@ def test_without_a_model_there_are_only_successes_and_failures(runs: Path, monke
 
 
 def test_a_split_that_no_run_played_is_an_error(runs: Path):
-    with pytest.raises(selection.NoEpisodes, match=r"no run in .* played open of synthetic reaches"):
+    with pytest.raises(episodes.NoEpisodes, match=r"no run in .* played open of synthetic reaches"):
         highlights.choose(runs, ["synthetic"], "open", rows=100)

@@ -140,8 +140,8 @@ def test_other_machines_cannot_connect(server: leaderboard_server.Server):
 
 
 def test_a_folder_without_a_page_is_one_line(tmp_path: Path, complaint: Callable[..., str]):
-    line = complaint("leaderboard", "serve", "--into", str(tmp_path))
-    assert "has no index.html; `dextron-bench leaderboard build --into" in line
+    line = complaint("leaderboard", "serve", "--board", str(tmp_path))
+    assert "has no index.html; `dextron-bench leaderboard build --board" in line
 
 
 SERVED = """

@@ -20,7 +20,7 @@ def board(tiny_world: Path) -> Path:
     """A board with two baselines on a tiny benchmark."""
     for method in ("nothing", "reflex"):
         assert main.main(["run", "--method", method, "--quiet"]) == 0
-    assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
+    assert main.main(["leaderboard", "build", "--runs", "runs", "--board", "board"]) == 0
     return tiny_world / "board"
 
 
@@ -41,7 +41,7 @@ def test_rows_play_each_track_once_and_keep_it(board: Path, capsys: pytest.Captu
     assert {len(splits[f"test+{track}"]["scores"]) for track in PLAYED} == {len(splits["test"]["scores"])}
     assert "Return under tracks, test of synthetic reaches" in (board / "index.html").read_text()
     assert collect.run_digest(board / RESULT) == before  # The step of `rebuild` that made the row stays fresh.
-    assert main.main(["leaderboard", "build", "--runs", "runs", "--into", "board"]) == 0
+    assert main.main(["leaderboard", "build", "--runs", "runs", "--board", "board"]) == 0
     assert json.loads((board / RESULT).read_text())["splits"] == splits  # The same run, published again, loses none.
 
 

@@ -26,8 +26,8 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
         "mine",
         "--seed",
         "0",
-        "--settings",
-        '{"near": 0.05}',
+        "--near",
+        "0.05",
         "--quiet",
     ]
     assert main.main(words) == 0
@@ -114,7 +114,7 @@ def test_baselines_on_a_board_are_run_again(submitted: Path, tmp_path: Path, cap
     runs, board = str(tmp_path / "runs"), tmp_path / "board"
     for method in ("exp", "random"):
         assert main.main(["run", "--method", method, "--record", "0", "--runs", runs, "--quiet"]) == 0
-    assert main.main(["leaderboard", "build", "--runs", runs, "--into", str(board)]) == 0
+    assert main.main(["leaderboard", "build", "--runs", runs, "--board", str(board)]) == 0
     capsys.readouterr()
     assert main.main(["leaderboard", "verify", "--all", "--rows", "1", "--board", str(board)]) == 0
     printed = capsys.readouterr().out
@@ -148,8 +148,6 @@ def test_an_invalid_submission_is_refused_with_the_reason(submitted: Path, capsy
         (["--name", "a/b"], "'a/b' is not a valid name"),
         (["--name", "a", "--memory", "0"], "--timeout and --memory are more than 0"),
         (["--name", "a", "--seed", "3"], "seeds must be 0, 1, 2 and so on"),
-        (["--name", "a", "--settings", "1"], "--settings takes a JSON object"),
-        (["--name", "a", "--settings", "{"], "--settings is not valid JSON"),
     ):
         assert main.main(["submit", f"{submitted}/near.py:Near", *words]) == 2
         assert reason in capsys.readouterr().err

@@ -24,7 +24,7 @@ ALIKE = "it resembles another condition, and is tried with --thorough"
 TOY = tiny_training.TOY
 RECORDING = "runs/reflex/synthetic/seed0/recordings/val-0000.rrd"
 COMMANDS = (
-    "list",
+    "runs methods",
     "check reflex",
     "run --method reflex --split val --record 1 --quiet",
     "recordings list",
@@ -107,5 +107,5 @@ def test_runs_behind_a_link_and_tables_in_a_terminal_of_80_columns(tmp_path: Pat
         lines = re.sub(r"\x1b\[[\d;]*m", "", done.stdout).splitlines()
         rows = [line for line in lines if line.startswith(("│", "┃"))]
         assert all(len(line.rstrip()) <= 80 for line in rows)
-        assert rows or words not in ("list", "recordings list", COMMANDS[2])
+        assert rows or words not in ("runs methods", "recordings list", COMMANDS[2])
     assert (tmp_path / "disk/reflex/synthetic/seed0/result.json").exists()

@@ -19,7 +19,7 @@ from dextron_bench.reaches.setting import from_frame
 from dextron_bench.runs import execution, result_files
 from dextron_bench.runs.plans import Plan, resolve
 from dextron_bench.splits.loading import load_split
-from dextron_bench.storage import atomic
+from dextron_bench.storage import atomic, hashing, tensors
 from tests.helpers import tiny_benchmark, tiny_training
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 from tests.helpers.tiny_runs import execute, forbidden
@@ -152,8 +152,34 @@ def test_a_run_creates_its_method_once(
     assert created == [spec]
 
 
+def test_weights_are_hashed_and_splits_are_loaded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    plan = Plan("tests.helpers.toy_learner:Toy", "synthetic", ("test",), settings={"preset": "quick"})
+    hashed, sha256, loaded, load = [], hashing.sha256, [], execution.load_split
+    monkeypatch.setattr(hashing, "sha256", lambda file: hashed.append(Path(file).name) or sha256(file))
+    monkeypatch.setattr(execution, "load_split", lambda *names: loaded.append(names[1]) or load(*names))
+    execution.execute(resolve(plan), tmp_path / "runs", threads=1)
+    assert hashed.count("weights.safetensors") == 1
+    assert loaded.count("test") == 1
+
+
 def test_a_run_constructs_its_method_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     constructed, construct = [], floors.Nothing.__init__
     monkeypatch.setattr(floors.Nothing, "__init__", lambda self: constructed.append(self) or construct(self))
     execution.execute(resolve(Plan("nothing", "synthetic", ("test", "open"), record=1)), tmp_path, threads=1)
     assert len(constructed) == 1
+
+
+def test_a_run_reads_its_splits_and_its_weights_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The weights are hashed once, read once into an agent, and each split is loaded once for the evaluation."""
+    tiny_training.install(tiny_training.write(tmp_path / "data"), monkeypatch.setattr)
+    run = resolve(Plan(tiny_training.TOY, "synthetic", ("test", "open"), settings={"preset": "smoke"}))
+    execution.train([run], tmp_path / "runs", threads=1)
+    hashed, loaded, read = [], [], []
+    hash_file, load, read_arrays = hashing.sha256, execution.load_split, tensors.read
+    monkeypatch.setattr(hashing, "sha256", lambda file: hashed.append(file.name) or hash_file(file))
+    monkeypatch.setattr(execution, "load_split", lambda *names: loaded.append(names[1]) or load(*names))
+    monkeypatch.setattr(tensors, "read", lambda file: read.append(file.name) or read_arrays(file))
+    execution.execute(run, tmp_path / "runs", threads=1)
+    assert hashed.count("weights.safetensors") == read.count("weights.safetensors") == 1
+    assert sorted(loaded) == ["open", "test", "train"]  # `train` for the number of demonstrations.

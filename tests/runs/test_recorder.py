@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-import pickle
+import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -35,9 +37,8 @@ def two(monkeypatch: pytest.MonkeyPatch) -> Iterator[Recorder]:
     """A recorder with two processes."""
     monkeypatch.setattr(recorder, "EACH", 1)
     with Recorder(SOURCE, 2, threads=2) as started:
-        assert len(started._processes) == 2
         yield started
-    assert all(process._popen.returncode is not None for process in started._processes)
+    assert not multiprocessing.active_children()
 
 
 def write_all(writer: Recorder, folder: Path) -> dict[str, str]:
@@ -47,13 +48,12 @@ def write_all(writer: Recorder, folder: Path) -> dict[str, str]:
 
 
 def test_processes_write_what_this_process_writes(tmp_path: Path, two: Recorder, monkeypatch: pytest.MonkeyPatch):
-    assert os.getsid(two._processes[0]._popen.pid) != os.getsid(0)  # Ctrl-C in a terminal does not reach it.
     monkeypatch.setattr(recorder, "AHEAD", 1)  # The third recording waits for the first one.
     (tmp_path / "beside").mkdir()
     (tmp_path / "here").mkdir()
     beside = write_all(two, tmp_path / "beside")
+    assert len(multiprocessing.active_children()) == 2
     with Recorder(SOURCE, len(CASES), threads=1) as alone:
-        assert not alone._processes
         here = write_all(alone, tmp_path / "here")
     assert list(beside) == list(here) == ["0.rrd", "1.rrd", "2.rrd", "3.rrd"]
     for name in here:
@@ -74,12 +74,12 @@ def test_a_recording_that_cannot_be_written_is_named(tmp_path: Path, two: Record
 
 
 def test_a_process_that_was_killed_is_named(tmp_path: Path, two: Recorder):
-    for process in two._processes:
-        process._popen.kill()
-        process._popen.wait()
-    two.write(tmp_path / "0.rrd", CASES[0], EPISODES[0], {})
-    with pytest.raises(LostProcess, match=r"has ended \(code -9\); run the command again, with --threads 1"):
-        two.hashes()
+    write_all(two, tmp_path)
+    for process in multiprocessing.active_children():
+        process.kill()
+        process.join()
+    with pytest.raises(LostProcess, match=r"has ended; run the command again, with --threads 1"):
+        write_all(two, tmp_path)
 
 
 def test_an_error_of_the_rollout_ends_all_processes_after_what_they_write(
@@ -91,25 +91,52 @@ def test_an_error_of_the_rollout_ends_all_processes_after_what_they_write(
     def stop() -> None:
         with two:
             for k, case in enumerate(CASES):
-                two.write(tmp_path / f"{k}.rrd", case, EPISODES[k], {})
+                two.write(tmp_path / f"{k}.rrd", case, EPISODES[k], {"row": k})
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         stop()
-    assert [process._popen.returncode for process in two._processes] == [0, 0]
+    assert not multiprocessing.active_children()
     assert not list(tmp_path.glob(".*.part"))  # No part of a file is left.
 
 
-@pytest.mark.parametrize("cut", [0, 100, -100], ids=["nothing", "part-of-the-source", "part-of-a-recording"])
-def test_a_process_ends_silently_if_the_other_one_is_killed(tmp_path: Path, cut: int):
-    """Its input ends wherever the other process was, and nobody reads the answer to the recording before that."""
-    job = (tmp_path / "0.rrd", CASES[0], EPISODES[0], {})
-    content = b"".join(map(pickle.dumps, (SOURCE, job, job)))
-    reading, writing = os.pipe()
-    os.close(reading)
-    done = subprocess.run(recorder.COMMAND, input=content[:cut], stdout=writing, stderr=subprocess.PIPE, timeout=60)
-    os.close(writing)
-    assert (done.returncode, done.stderr, (tmp_path / "0.rrd").exists()) == (0, b"", cut < 0)
+PROGRAM = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, {root!r})
+from dextron_bench.runs import recorder
+from tests.runs.test_recorder import CASES, EPISODES, SOURCE
+if __name__ == "__main__":
+    recorder.EACH = 1
+    with recorder.Recorder(SOURCE, 2, threads=2) as two:
+        two.write(Path("0.rrd"), CASES[0], EPISODES[0], {{}})
+        two.hashes()
+        import multiprocessing
+        print(*(child.pid for child in multiprocessing.active_children()), flush=True)
+        time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_processes_end_silently_with_the_one_that_started_them(tmp_path: Path, sent: signal.Signals):
+    """Ctrl-C goes to all processes of a terminal; the only traceback is of the first one, whose command catches it."""
+    (tmp_path / "program.py").write_text(PROGRAM.format(root=str(Path(__file__).parents[2])))
+    command = [sys.executable, "-P", "program.py"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=tmp_path, start_new_session=True, **pipes) as program:
+        assert program.stdout
+        assert program.stderr
+        assert len(program.stdout.readline().split()) > 0
+        if sent == signal.SIGINT:
+            os.killpg(program.pid, sent)
+        else:
+            program.kill()
+        errors = program.stderr.read()  # Until the last process that could write to it has ended.
+    if sent == signal.SIGINT:
+        assert errors.startswith('Traceback (most recent call last):\n  File "'), errors
+        assert errors.count("Traceback") == 1, errors
+    else:
+        assert not errors
 
 
 @pytest.mark.parametrize(
@@ -118,7 +145,7 @@ def test_a_process_ends_silently_if_the_other_one_is_killed(tmp_path: Path, cut:
 def test_each_process_has_twelve_recordings_or_more(
     monkeypatch: pytest.MonkeyPatch, count: int, threads: int, processes: int
 ):
-    started = list[object]()
-    monkeypatch.setattr(recorder, "_Process", started.append)
-    Recorder(SOURCE, count, threads).__enter__()
-    assert started == [SOURCE] * processes
+    started = list[tuple[object, int]]()
+    monkeypatch.setattr(recorder, "_pool", lambda *of: started.append(of))
+    Recorder(SOURCE, count, threads)
+    assert started == ([(SOURCE, processes)] if processes else [])

@@ -6,9 +6,11 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from dextron_bench import recording
+from dextron_bench.evaluation import diagnosis
 from dextron_bench.evaluation.rollout import rollout
 from dextron_bench.experts.policies import ExpertAgent
 from dextron_bench.runs import execution, result_files
@@ -34,6 +36,16 @@ def test_a_recording_reads_back_as_the_episode(tmp_path: Path):
     assert properties == {
         "method": "exp", "reaches": "synthetic", "split": "test", "split_digest": split.digest, "row": 0, "seed": 3,
     }  # fmt: skip
+
+
+def test_an_episode_that_is_recorded_is_diagnosed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    diagnosed, diagnose = list[object](), diagnosis.diagnose
+    monkeypatch.setattr(diagnosis, "diagnose", lambda *one: diagnosed.append(one) or diagnose(*one))
+    folder = execute(tmp_path, Plan("exp", "synthetic", ("test",), seed=3, record=1))
+    table = pd.read_parquet(folder / "episodes.parquet")
+    assert len(diagnosed) == len(table)
+    recorded = recording.read(folder / "recordings" / "test-0000.rrd")
+    assert recorded.properties["cause"] == table["cause"].iloc[0]
 
 
 def test_an_episode_without_a_step_is_not_recorded_and_not_played_again(

@@ -169,7 +169,7 @@ def test_the_interquartile_mean_has_the_uncertainty_of_settings_within_strata():
 def test_the_interquartile_mean_has_the_uncertainty_of_few_seeds():
     """Three seeds score 9, 10 and 11 everywhere, so three drawn ones a <= b <= c have the mean (a + 2 b + c) / 4.
 
-    The variance over all 27 draws is that of seeds drawn from these three, 2/3 of what it is for seeds of a method.
+    The variance over all 27 draws belongs to seeds drawn from these three: 2/3 of the variance for seeds of a method.
     Student's t of two degrees of freedom is 4.3027.
     """
     seeds = np.array([9.0, 10.0, 11.0])

@@ -53,7 +53,7 @@ def test_tables_curves_and_page_are_rebuilt_from_the_results(tmp_path: Path):
     rebuilt = tmp_path / "board"
     shutil.copytree(BOARD, rebuilt)
     (tmp_path / "recordings").symlink_to(BOARD.parent / "recordings")
-    assert main.main(["leaderboard", "build", "--into", str(rebuilt)]) == 0
+    assert main.main(["leaderboard", "build", "--board", str(rebuilt)]) == 0
     for file in ("README.md", "table.csv", "table.json", "index.html"):
         assert (rebuilt / file).read_text() == (BOARD / file).read_text()
     assert {file.name for file in rebuilt.glob("*.png")} == {file.name for file in BOARD.glob("*.png")}

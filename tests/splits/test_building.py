@@ -149,6 +149,6 @@ def test_writing_minjerk_keeps_the_other_sources(tmp_path):
 
 
 def test_every_source_except_minjerk_needs_a_database(tmp_path, capsys):
-    assert main.main(["splits", "--reaches", "synthetic", "--into", str(tmp_path)]) == 2
+    assert main.main(["data", "splits", "--reaches", "synthetic", "--into", str(tmp_path)]) == 2
     assert "splits of synthetic reaches need --database" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

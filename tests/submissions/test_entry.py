@@ -1,8 +1,7 @@
-"""The entry of a submission: settings from JSON, and the rules for names and seeds."""
+"""The entry of a submission: settings, and the rules for names and seeds."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -13,11 +12,11 @@ from dextron_bench.submissions.entry import BadSubmission, Entry
 
 def test_settings_of_an_installed_method_are_complete():
     """With these settings the method can be made again."""
-    settings = entry.settings_from_json("omega", '{"near": 0.1}', "synthetic")
+    settings = entry.whole_settings("omega", {"near": 0.1}, "synthetic")
     assert settings["near"] == 0.1
     assert len(settings["sha256"]) == 64
-    assert entry.settings_from_json("omega", json.dumps(settings), "synthetic") == settings
-    assert entry.settings_from_json("mine.py:Mine", '{"near": 0.1}', "synthetic") == {"near": 0.1}
+    assert entry.whole_settings("omega", settings, "synthetic") == settings
+    assert entry.whole_settings("mine.py:Mine", {"near": 0.1}, "synthetic") == {"near": 0.1}
 
 
 @pytest.mark.parametrize(

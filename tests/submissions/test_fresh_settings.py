@@ -22,6 +22,7 @@ from dextron_bench.splits import fresh, fresh_settings
 from dextron_bench.splits.fresh_settings import FreshSettings
 from dextron_bench.splits.loading import Split, cases_from_frame, split_digest
 from dextron_bench.submissions import bundle, entry, playing, verification
+from dextron_bench.submissions.seed_check import Playing
 from dextron_bench.submissions.verdict import Verdict
 from dextron_bench.world.engine import Engine
 from tests.helpers import forged_bundles, tiny_benchmark
@@ -195,7 +196,7 @@ def verified(here: Path, name: str, spec: str, settings: dict[str, float]) -> Ve
     file, into = here / f"{name}.zip", here / f"{name}-unpacked"
     playing.write_bundle(one, playing.play_entry(one, here / "runs", 0, limits), file)
     manifest = bundle.unpack(file, into)
-    return verification.verify(into, manifest, rerun=True, limits=limits, fresh=FRESH)
+    return verification.verify(into, manifest, how=Playing(limits), rerun=True, fresh=FRESH)
 
 
 AGENTS = {  # By name: class, settings, and whether the row is marked.

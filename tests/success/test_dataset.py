@@ -9,7 +9,11 @@ import pytest
 
 from dextron_bench.storage import tensors
 from dextron_bench.success.dataset import BadDataset, Dataset, EmptyDataset
-from dextron_bench.success.generation import block_file
+
+
+def block_file(folder: Path, number: int) -> Path:
+    """The file of a block in the folder of a data set."""
+    return folder / "blocks" / f"{number:06d}.safetensors"
 
 
 def write_block(folder: Path, number: int, lengths: list[int], solved: list[int]) -> None:

@@ -21,10 +21,9 @@ from dextron_bench.success.generation import (
     UNIFORM,
     BadDatasetConfig,
     DatasetConfig,
+    Generation,
     Tally,
-    block_file,
     draw_rows,
-    generate,
 )
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
@@ -33,7 +32,11 @@ SMALL = DatasetConfig("synthetic", block=5, policies=("nothing",))
 
 
 def generate_small(folder: Path, rows: int, config: DatasetConfig = SMALL, threads: int = 1) -> dict[str, Tally]:
-    return generate(SOURCE, TRAIN, config, folder, rows, {"nothing": Nothing().agent(0)}, threads)
+    return work_in(folder, rows, config, threads).run()
+
+
+def work_in(folder: Path, rows: int = 1, config: DatasetConfig = SMALL, threads: int = 1) -> Generation:
+    return Generation(config, folder, rows, SOURCE, TRAIN, {"nothing": Nothing().agent(0)}, threads=threads)
 
 
 def file_contents(folder: Path) -> dict[str, bytes]:
@@ -72,11 +75,11 @@ def test_a_stopped_generation_continues_to_the_same_bytes_with_any_number_of_thr
 
 def test_a_block_holds_the_played_episodes_in_float32(tmp_path: Path):
     generate_small(tmp_path, 1)
-    block = tensors.read(block_file(tmp_path, 0))
+    block = tensors.read(work_in(tmp_path).block_file(0))
     assert block["states"].shape == (block["starts"][-1], 48)
     assert block["states"].dtype == block["actions"].dtype == np.float32
     np.testing.assert_array_equal(block["actions"][block["starts"][:-1]], 0.0)  # An expert's first action.
-    header = block_file(tmp_path, 0).stat().st_size - sum(array.nbytes for array in block.values())
+    header = work_in(tmp_path).block_file(0).stat().st_size - sum(array.nbytes for array in block.values())
     assert sum(array.nbytes for array in (block["states"], block["actions"])) == 4 * 49 * len(block["actions"])
     assert 0 < header < 1000  # Nothing else is in the file.
 
@@ -91,7 +94,7 @@ def test_only_an_episode_with_the_whole_return_is_labelled_a_success(tmp_path: P
 
     monkeypatch.setattr(generation, "rollout", rollout)
     tallies = generate_small(tmp_path, 1)
-    assert tensors.read(block_file(tmp_path, 0))["solved"].tolist() == [1, 0, 0, 0, 1]
+    assert tensors.read(work_in(tmp_path).block_file(0))["solved"].tolist() == [1, 0, 0, 0, 1]
     assert tallies[SOLVED] == Tally(rows=10, episodes=5, solved=2)
 
 
@@ -105,7 +108,7 @@ def test_a_folder_of_another_data_set_is_refused(tmp_path: Path):
 
 def test_a_truncated_block_and_a_number_of_rows_below_1_are_refused(tmp_path: Path):
     generate_small(tmp_path, 100)
-    file = block_file(tmp_path, 0)
+    file = work_in(tmp_path).block_file(0)
     file.write_bytes(file.read_bytes()[:-40])
     with pytest.raises(BadDataset, match=r"000000.*remove it"):
         generate_small(tmp_path, 100_000)

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from dextron_bench.storage import folder_config, tensors
-from dextron_bench.success.generation import block_file
 from dextron_bench.success.training import MODEL, STATE, BadTrainingConfig, TrainingConfig, train
-from tests.success.test_dataset import write_block
+from tests.success.test_dataset import block_file, write_block
 from tests.success.test_generation import file_contents
 
 SHORT = TrainingConfig(epochs=2, updates=3, batch=8)

@@ -1,4 +1,4 @@
-"""`dextron-bench rebuild` runs the stale steps in order, and knows which they are."""
+"""`make rebuild` runs the stale steps in order, and knows which they are."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.cli.commands import COMMANDS
+from dextron_bench.cli.commands import Group, find
 from dextron_bench.world import model
 from tools import rebuild, rebuild_steps
 from tools.rebuild_steps import STEPS, Step
@@ -97,7 +97,7 @@ def test_every_command_of_every_step_is_one_that_the_command_line_accepts():
     for step in STEPS:
         for command in step.commands:
             words = command.format(runs="runs").replace("*", "x").split()
-            assert words[0] in COMMANDS
+            assert not isinstance(find(words)[1], Group | None)
             main._parse(words)
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import mujoco
 import numpy as np
 import pytest
 
 from dextron_bench.world import model
+from tools import hand_constants
 
 FINGERS = model.DIGITS[1:]
 CARRIED = "palm", "thumb_proximal"  # Overlap, and do not collide in the release.
@@ -74,3 +77,8 @@ def test_pairs_that_are_excluded_can_never_touch() -> None:
         for first, second in zip(geoms[::2], geoms[1::2], strict=True):
             closest = min(closest, mujoco.mj_geomDistance(compiled, data, first, second, 0.05, None))
     assert closest > MARGIN
+
+
+def test_the_constants_beside_the_model_are_those_of_the_model():
+    """An isolated agent has no simulator: what it computes from states must be what the world computes."""
+    assert json.loads(hand_constants.FILE.read_text()) == hand_constants.constants(), "python -m tools.hand_constants"

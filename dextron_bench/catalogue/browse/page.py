@@ -9,7 +9,7 @@ from string import Template
 import pandas as pd
 
 from dextron_bench.catalogue.browse.search import ORDERS, Search
-from dextron_bench.catalogue.episode_catalogue import COLUMNS, STATE
+from dextron_bench.catalogue.episodes import COLUMNS, STATE
 from dextron_bench.catalogue.expressions import BadExpression
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.web.html import Html, join, style, tag

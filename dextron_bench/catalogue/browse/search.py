@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 import pandas as pd
 
 from dextron_bench.catalogue import expressions
-from dextron_bench.catalogue.episode_catalogue import COLUMNS
+from dextron_bench.catalogue.episodes import COLUMNS
 
 SHOWN = 24  # Cards on a page.
 ORDERS = {  # Name of each order, with its column and whether the lowest values come first.
@@ -62,7 +62,7 @@ class Search:
 
     def matching(self, episodes: pd.DataFrame) -> pd.DataFrame:
         """The episodes that match, in order; raises BadExpression."""
-        table = episodes[expressions.matches(episodes[list(COLUMNS)], self.where)]
+        table = expressions.filtered(episodes, self.where, COLUMNS)
         column, ascending = ORDERS[self.order]
         return table.sort_values(column, ascending=ascending, kind="stable") if column else table
 

@@ -12,7 +12,8 @@ from typing import cast
 
 import pandas as pd
 
-from dextron_bench.catalogue import episode_catalogue, rerecording, selection
+from dextron_bench.catalogue import episodes as catalogue
+from dextron_bench.catalogue import rerecording, selection
 from dextron_bench.catalogue.browse import page
 from dextron_bench.catalogue.browse.pictures import Pictures
 from dextron_bench.catalogue.browse.search import Search
@@ -91,7 +92,7 @@ class BrowseSite:
     def _picture(self, key: str) -> Response | None:
         if key not in self._episodes.index:
             return None
-        state = episode_catalogue.last_state(self._episode(key))
+        state = catalogue.last_state(self._episode(key))
         content = None if state is None else self._pictures.draw(key, state)
         return None if content is None else Response("image/png", content, {"Cache-Control": "private, max-age=3600"})
 
@@ -106,7 +107,7 @@ class BrowseSite:
         """Makes the recording of an episode if there is none; raises the errors of `rerecord`, and DamagedRecording."""
         from dextron_bench import recording
 
-        files = rerecording.rerecord(episode_catalogue.with_actions(self._episode(key)))
+        files = rerecording.rerecord(self._episodes.loc[[key]])
         for summary in recording.summarise(files, whole=True, hashes=selection.hashes(files)):
             if summary.damage:
                 raise DamagedRecording(f"{summary.file}: {summary.damage}")

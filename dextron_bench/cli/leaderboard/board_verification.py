@@ -2,47 +2,33 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
-from dextron_bench.cli.support import clusters, shares
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import progress_bar
-from dextron_bench.leaderboard import build, finding_pieces
+from dextron_bench.leaderboard import build
 from dextron_bench.leaderboard import verify_board as board
-from dextron_bench.leaderboard.baseline_check import Finding
-from dextron_bench.leaderboard.finding_pieces import FindingPieces
-from dextron_bench.leaderboard.verify_board import Row
+from dextron_bench.leaderboard.row_checks import RowChecks
 from dextron_bench.storage.printable import printable_line
 
 if TYPE_CHECKING:
-    from dextron_bench.cli.leaderboard.verify import Verify
+    from dextron_bench.cli.support.verification_flags import BoardFlags
 
 SHOWN = 5  # How many problems of a row are printed.
 
 
-def verify_share(flags: Verify, share: shares.Share) -> int:
-    """Verifies the rows of a share and stores what it finds; returns the exit code."""
-    pieces, rows = _pieces(flags), board.rows(flags.board, flags.method, flags.reaches)
-    mine = [row for place, row in enumerate(rows) if share.has(place)]
-    stored = pieces.read(rows)
-    for row in mine:
-        if row.run.identity not in stored:
-            pieces.write(row, _check(flags, row))
-    return shares.print_done(share, f"{len(mine)} of {len(rows)} rows", pieces.folder)
+def verify_board(flags: BoardFlags) -> int:
+    """Verifies every row, or a share of them, or with --merge takes the findings of shares; returns the exit code.
 
-
-def verify_board(flags: Verify) -> int:
-    """Verifies every row, or with --merge takes the findings of shares, and prints them; returns the exit code."""
-    sound, pieces = True, _pieces(flags)
+    Prints what is found, save for a share, whose findings are stored.
+    """
     rows = board.rows(flags.board, flags.method, flags.reaches)
-    if flags.cluster:
-        _check_on_cluster(flags, pieces, rows)
-    stored = pieces.read(rows)
-    if flags.merge:
-        shares.check_complete("the merge", [row.run.identity for row in rows], stored)
-    findings = {name: finding_pieces.finding_of(piece) for name, piece in stored.items()}
-    for row in rows:
-        finding = findings.get(row.run.identity) or _check(flags, row)
+    checks = RowChecks(flags.runs / "verify", flags.board, rows, flags.rows, flags.redraw, flags.threads)
+    if flags.pieces.play(lambda: [checks], flags.runs, flags.threads, flags.quiet):
+        return DONE
+    sound = True
+    for row, finding in checks.findings(functools.partial(progress_bar, quiet=flags.quiet)):
         done = finding.done if not finding.problems else "DIFFERS from its episodes"
         print(printable_line(f"{row.name}: {done}"), flush=True)
         for problem in finding.problems[:SHOWN]:
@@ -50,7 +36,6 @@ def verify_board(flags: Verify) -> int:
         sound &= not finding.problems
         if flags.stamp and board.stamp(row, finding):
             print("  its tier is now `re-run`")
-    pieces.remove(stored.values())
     if flags.stamp:
         build.build(flags.board)
     if problems := board.differing_files(flags.board):
@@ -58,22 +43,3 @@ def verify_board(flags: Verify) -> int:
     else:
         print("tables and page: equal to those computed again from the results")
     return DONE if sound and not problems else DIFFERS
-
-
-def _check_on_cluster(flags: Verify, pieces: FindingPieces, rows: list[Row]) -> None:
-    from dextron_bench.cluster import verifications
-
-    with (
-        clusters.connected(flags.cluster, flags.runs, flags.threads) as cluster,
-        progress_bar("rows", flags.quiet) as progress,
-    ):
-        verifications.check(cluster, pieces, rows, flags.runs, progress)
-
-
-def _check(flags: Verify, row: Row) -> Finding:
-    with progress_bar(row.name, flags.quiet) as progress:
-        return board.check(row, flags.board, flags.rows, flags.redraw, flags.threads, progress)
-
-
-def _pieces(flags: Verify) -> FindingPieces:
-    return FindingPieces(flags.runs / "verify", flags.board, {"rows": flags.rows, "redraw": flags.redraw})

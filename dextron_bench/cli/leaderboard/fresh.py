@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dextron_bench.cli.leaderboard.baselines import BaselineFlags
+from dextron_bench.cli.support.baseline_flags import BaselineFlags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import progress_bar
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import tyro
-
-from dextron_bench.cli.runs.show import INTERVALS, code_of, interval_text, plain
+from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
 from dextron_bench.cli.support.output import print_json, print_table
+from dextron_bench.cli.support.run_cells import INTERVALS, code_of, interval_text, plain
 
 if TYPE_CHECKING:
     from dextron_bench.catalogue.run_catalogue import Entry
@@ -30,11 +29,9 @@ class Compare:
     Example: dextron-bench runs compare rl-hold40/real rlil-0.1/real --into curves.png
     """
 
-    run: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
-    """The runs, by label, or by label and source of reaches."""
-    runs: Path = Path("runs")
-    """Folder of all runs."""
-    into: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|svg|pdf")] = None
+    run: flags.RunNames
+    runs: flags.Runs = flags.RUNS
+    into: flags.Picture = None
     """Draw the learning curves into this file."""
     json: bool = False
     """Print JSON."""

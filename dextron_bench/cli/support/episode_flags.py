@@ -33,6 +33,8 @@ class EpisodeFlags:
     """Select only episodes with this cause, such as "too late"; docs/diagnosis.md lists all causes."""
     row: tuple[int, ...] = ()
     """Select only these rows of the splits."""
+    where: str = ""
+    """Select only episodes that match an expression, as in `browse`: "cause == 'too late' and return < 5"."""
 
     def episode_filter(self) -> EpisodeFilter:
         """The filter of these flags; raises BadFilter."""

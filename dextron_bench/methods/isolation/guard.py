@@ -12,10 +12,7 @@ import sys
 from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
 from pathlib import Path
-from types import ModuleType
 from typing import Any
-
-import numpy as np
 
 from dextron_bench.methods.isolation import sandbox
 
@@ -70,42 +67,14 @@ def public_files() -> list[Path]:
     worker = (*WORKER, *(f"{WORKER[0]}.{name}" for name in WORKER_FILES), "dextron_bench.world.registration")
     places = [package.parent.joinpath(*name.split(".")) for name in (*PUBLIC, *worker)]
     modules = [place / "__init__.py" if place.is_dir() else place.with_suffix(".py") for place in places]
-    return sorted({*modules, *(package / "data").glob("success-*.safetensors")})
-
-
-def constants() -> dict[str, Any]:
-    """What pure functions of states need from the simulator's model, as JSON values; for `use_constants`."""
-    from dextron_bench.world import model
-
-    joints, closed = model.proximal()
-    arrays = {"joints": joints, "closed": closed, "gain": model.command_gain(), "half_closed": model.initial_qpos()}
-    return {**{name: array.tolist() for name, array in arrays.items()}, "state_names": model.state_names()}
-
-
-def use_constants(values: dict[str, Any]) -> None:
-    """Lets `world.model` work without the simulator, which the sandbox does not have."""
-    simulator = ModuleType("dextron_bench.world.simulator")
-    simulator.mujoco = None  # type: ignore[attr-defined]
-    sys.modules[simulator.__name__] = simulator
-    from dextron_bench.world import model
-
-    arrays = {name: np.array(values[name]) for name in ("joints", "closed", "gain", "half_closed")}
-    for array in arrays.values():
-        array.flags.writeable = False
-    names = tuple(values["state_names"])
-    model.proximal = lambda: (arrays["joints"], arrays["closed"])  # type: ignore[assignment]
-    model.command_gain = lambda: arrays["gain"]  # type: ignore[assignment]
-    model.initial_qpos = lambda: arrays["half_closed"]  # type: ignore[assignment]
-    model.state_names = lambda: names  # type: ignore[assignment]
+    return sorted({*modules, package / "world" / "hand.json", *(package / "data").glob("success-*.safetensors")})
 
 
 def hide_simulator() -> None:
-    """Removes the simulator from this process; caches the values that pure functions of states need from it."""
+    """Removes the simulator, and public names whose modules are hidden, from this process."""
     from dextron_bench.world import model
 
-    for cached in (model.proximal, model.command_gain, model.initial_qpos, model.state_names):
-        cached()
-    model.load = model.mujoco = None  # type: ignore[assignment]
+    model.load.cache_clear()
     package = vars(sys.modules["dextron_bench"])
     for name in [name for name, value in package.items() if _is_hidden(str(getattr(value, "__module__", "")))]:
         del package[name]  # A public name that was used before: its module is hidden.

@@ -48,7 +48,7 @@ class Launch:
         """
         if not self.trusted and not sandbox.is_available():
             raise NoSandbox(self.spec)
-        request = json.dumps({**asdict(self), "scratch": scratch, "constants": guard.constants()})
+        request = json.dumps({**asdict(self), "scratch": scratch})
         worker = programs.python("-m", "dextron_bench.methods.isolation.worker", request)
         return sandbox.wrap(self.command or worker, scratch, self.readable, memory, disk, self._public_files())
 

@@ -29,8 +29,6 @@ def main(request: dict[str, Any]) -> None:
     questions = sys.stdin.buffer
     spec = AgentSpec(**request["spec"])
     installed = loading.load_class(spec) if spec.kind == "method" else None
-    if not installed:
-        guard.use_constants(request["constants"])
     if spec.kind == "module":
         sys.meta_path.append(_Package(spec.location.partition(".")[0], request["folder"]))
     guard.install([Path(path) for path in request["readable"]], Path(request["scratch"]))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from dextron_bench.catalogue import episode_catalogue
+from dextron_bench.catalogue import episodes as catalogue
 from dextron_bench.catalogue.browse.site import BrowseSite
 from dextron_bench.web.local_server import LocalServer, ViewerFiles
 
@@ -22,7 +22,7 @@ def runs(two_runs: Path) -> Path:
 
 @pytest.fixture
 def episodes(runs: Path) -> pd.DataFrame:
-    return episode_catalogue.read([runs])
+    return catalogue.read([runs])
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dextron_bench.catalogue.browse.search import ORDERS, SHOWN, Search
-from dextron_bench.catalogue.episode_catalogue import COLUMNS, STATE
+from dextron_bench.catalogue.episodes import COLUMNS, STATE
 
 EPISODES = pd.DataFrame(
     dict.fromkeys((*COLUMNS, STATE), "")

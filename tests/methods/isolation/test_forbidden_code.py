@@ -24,7 +24,7 @@ MEMORY = "MiB of memory, more than 768"
         ("import mujoco", "agents may not import mujoco"),
         ("import importlib; importlib.import_module('mujoco')", "agents may not import mujoco,"),
         ("from dextron_bench import Setting", "agents may not import dextron_bench.reaches.setting"),
-        ("from dextron_bench.world import model; model.load()", "'NoneType' object is not callable"),
+        ("from dextron_bench.world import model; model.load()", "agents may not import dextron_bench.world.simulator"),
         ("import dextron_bench as d; open(d.__path__[0] + '/data/splits.json')", "settings and experts are not for"),
         ("open('/etc/../root/.bashrc')", "may read only Python's files and their own folder"),
         ("open(__file__, 'a')", "may write only in the folder that they start in"),

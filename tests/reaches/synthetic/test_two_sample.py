@@ -19,7 +19,7 @@ import pandas as pd
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.cli.data.synthetic import compared, print_likeness
+from dextron_bench.cli.data.likeness import print_likeness
 from dextron_bench.reaches.reach import Reach
 from dextron_bench.reaches.recorded import cache as recorded_cache
 from dextron_bench.reaches.setting import Source
@@ -34,6 +34,8 @@ from dextron_bench.reaches.synthetic.two_sample_features import (
     single_feature_aucs,
     summaries,
 )
+from tools import fit_synthetic
+from tools.fit_synthetic import compared
 
 STUDY = """
 import sys
@@ -182,18 +184,28 @@ def test_without_scikit_learn_the_error_says_how_to_install_it(
     assert "pip install scikit-learn" in printed.err
 
 
-@pytest.mark.parametrize("command", ["fit", "likeness"])
+def likeness(*words: str) -> int:
+    """The exit code of `data likeness`."""
+    return main.main(["data", "likeness", *words])
+
+
+def fit_command(*words: str) -> int:
+    """The exit code of `python -m tools.fit_synthetic`."""
+    return fit_synthetic.main(words)
+
+
+@pytest.mark.parametrize("command", [fit_command, likeness])
 def test_without_recordings_the_error_says_how_to_get_them(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: Callable[..., int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.delenv("DEXTRON_DATA", raising=False)
     monkeypatch.setenv("DEXTRON_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
-    assert main.main(["data", command]) == 2
+    assert command() == 2
     printed = capsys.readouterr()
     assert (printed.out, printed.err.count("\n")) == ("", 1)
     assert "data import --from" in printed.err
-    assert main.main(["data", command, "--seed", "-1"]) == 2
+    assert command("--seed", "-1") == 2
     assert "--seed is -1; it must be 0 or more" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
@@ -233,7 +245,7 @@ def test_fit_reproduces_the_shipped_model(opened: Callable[[str], Source], tmp_p
     file = tmp_path / "new" / "model.npz"
     opened("real")
     places = {"DEXTRON_CACHE": str(recorded_cache.cache_folder()), "DEXTRON_DATA": os.environ.get("DEXTRON_DATA", "")}
-    done = shell(["-m", "dextron_bench", "data", "fit", "--into", str(file)], tmp_path, **places)
+    done = shell(["-m", "tools.fit_synthetic", "--into", str(file)], tmp_path, **places)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"{file}: {file.stat().st_size:,} bytes, ")
     assert "shipped file" in done.stdout

@@ -1,0 +1,1 @@
+"""`dextron-bench sweep`."""
