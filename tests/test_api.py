@@ -60,6 +60,7 @@ def test_the_import_of_the_package_loads_nothing_heavy():
     assert not HEAVY & loaded("import sys, dextron_bench; print(*sys.modules)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(NEEDED))
 def test_a_name_loads_no_more_than_it_needs(name: str):
     modules = loaded(SCRIPT.format(name=name))

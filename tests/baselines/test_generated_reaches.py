@@ -23,6 +23,7 @@ def generated() -> tuple[ReachSource, list[Setting]]:
     return generated_reaches.generate(SYNTHETIC, KNOWN, 6)
 
 
+@pytest.mark.slow
 def test_equal_settings_give_equal_reaches_and_other_reaches_give_other_names(
     generated: tuple[ReachSource, list[Setting]],
 ):

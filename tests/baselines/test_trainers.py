@@ -23,8 +23,9 @@ from tests.helpers.short_reaches import SETTINGS, SOURCE
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
 FRAMES = 40  # Of an epoch.
 SCHEDULE = Schedule(epochs=4, warm_start=30, period=1)
-QUICK = ("rl", "held", "rlil", "bc", "dagger")
-KINDS = (*QUICK, *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("rlpd", "stopping")))
+QUICK = ("rlil", "bc")
+SLOW = ("rl", "held", "dagger", "rlpd", "stopping")
+KINDS = (*QUICK, *(pytest.param(kind, marks=pytest.mark.slow) for kind in SLOW))
 
 
 @pytest.fixture(autouse=True)

@@ -53,6 +53,7 @@ def read(tmp_path: Path, needs_mlflow: None) -> dict[str, Any]:
     return runs
 
 
+@pytest.mark.slow
 def test_mlflow_reads_settings_scores_curves_and_tags(read: dict[str, Any]):
     done = read[DONE.name].data
     assert done.params == DONE.params
@@ -61,6 +62,7 @@ def test_mlflow_reads_settings_scores_curves_and_tags(read: dict[str, Any]):
     assert sorted(read["history"]) == [(epoch, 1 / epoch) for epoch in range(1, 1201)]
 
 
+@pytest.mark.slow
 def test_mlflow_reads_states_and_times(read: dict[str, Any]):
     infos = {name.partition("/")[0]: read[name].info for name in (DONE.name, *(run.name for run in OTHERS))}
     began, ended = 1767229200000, 1767232800000  # 1:00 and 2:00 on 2026-01-01, in milliseconds.
@@ -73,6 +75,7 @@ def test_mlflow_reads_states_and_times(read: dict[str, Any]):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("needs_mlflow")
 def test_an_export_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def fail(*_: object) -> None:
@@ -84,6 +87,7 @@ def test_an_export_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest
     assert os.listdir(tmp_path / "new") == []
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("needs_mlflow")
 def test_a_value_that_mlflow_refuses_is_one_error(tmp_path: Path):
     refused = ExportedRun("a", "FINISHED", RunTimes(), metrics=[Metric("a/../b", 1.0)])

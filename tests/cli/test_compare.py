@@ -173,6 +173,7 @@ def test_a_split_version_that_does_not_ship_has_no_groups(compared: Callable[...
     assert [group["group"] for group in compared("one", "other")["groups"]] == ["all"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("format", ["png", "svg"])
 def test_a_picture_is_drawn(here: Path, format: str):
     assert main.main(["compare", "good", "bad", "--into", f"difference.{format}"]) == 0

@@ -30,6 +30,7 @@ def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
     return process.returncode, printed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", SHARED, ids="+".join)
 def test_a_training_ends_with_the_same_bytes(training_world: Path, names: tuple[str, ...]):
     assert main.main([*TRAIN, "--runs", "plain"]) == 0

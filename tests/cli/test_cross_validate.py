@@ -48,6 +48,7 @@ def validate(*words: str, method: str = TOY, beside: Sequence[str] = ("exp",)) -
     return ["sweep", "cross-validate", "--method", method, *preset, "--beside", *beside, "--quiet", *words]
 
 
+@pytest.mark.slow
 def test_a_method_learns_without_each_subject_and_plays_its_settings(
     here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
@@ -81,6 +82,7 @@ def test_a_method_learns_without_each_subject_and_plays_its_settings(
     assert len(learned) == 2  # Nothing was trained again.
 
 
+@pytest.mark.slow
 def test_an_interrupted_command_continues_with_equal_files(here: Path, monkeypatch: pytest.MonkeyPatch):
     assert main.main(validate("--runs", "whole")) == 0
     Interruptions(monkeypatch).finish(lambda: main.main(validate("--runs", "broken")))

@@ -60,6 +60,7 @@ def first_split(result: dict[str, Any], **values: Any) -> None:
     result["splits"]["test"] |= values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "change", "command"),
     [
@@ -134,6 +135,7 @@ def test_a_damaged_cache_of_demonstrations_is_named(finished: Path, tmp_path: Pa
         demonstrations.load(setup)
 
 
+@pytest.mark.slow
 def test_a_hidden_folder_is_never_published(here: Path):
     """A killed `leaderboard add` of an earlier version leaves such a folder in the results."""
     assert main.main(BUILD) == 0

@@ -61,6 +61,7 @@ def with_line(content: bytes, number: int, line: bytes) -> bytes:
     return b"".join(lines)
 
 
+@pytest.mark.slow
 def test_import_then_info(small_release: SmallRelease):
     done = run(small_release, "data", "import", "--from", small_release.zip())
     assert (done.returncode, done.stderr) == (0, "")
@@ -90,6 +91,7 @@ DAMAGE = {
 QUICK = ("truncated", "value")  # The others are slow, since each starts a process.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=[] if k in QUICK else pytest.mark.slow) for k in DAMAGE])
 def test_damage_is_one_line_with_file_and_position(small_release: SmallRelease, kind: str):
     file, damage, expected = DAMAGE[kind]
@@ -157,6 +159,7 @@ def test_help_imports_nothing_heavy():
     assert not {"torch", "mujoco", "scipy", "pandas", "matplotlib", "rerun", "pyarrow"} & set(loaded)
 
 
+@pytest.mark.slow
 def test_a_pipe_that_closes_early_is_no_error(small_release: SmallRelease):
     run(small_release, "data", "import", "--from", small_release.zip())
     command = [sys.executable, "-c", INJECT, str(small_release.manifest), "data", "info"]

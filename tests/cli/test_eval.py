@@ -41,6 +41,7 @@ def test_weights_of_a_file_give_the_row_of_its_run(here: Path, printed_json: Cal
     assert len(printed_json("leaderboard", "show")) == 1  # Evaluations of weights do not count.
 
 
+@pytest.mark.slow
 def test_weights_that_ship_lie_beside_the_method(
     here: Path, printed_json: Callable[..., Any], complaint: Callable[..., str]
 ):
@@ -82,6 +83,7 @@ def damaged(folder: Path, kind: str) -> Path:
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "expected"),
     [

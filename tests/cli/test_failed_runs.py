@@ -115,6 +115,7 @@ def test_a_full_disk_is_one_line_and_leaves_no_partial_file(
     ]
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_is_code_130_and_continues_later(here: Path, capsys: pytest.CaptureFixture[str]):
     spoil = "import time; open('started', 'w').close(); time.sleep(0.05)"
     words = run(mine(here, spoil))

@@ -30,6 +30,7 @@ def printed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES)
 def test_all_commands_see_the_runs_behind_a_link(
     place: str, two_runs: Path, capsys: pytest.CaptureFixture[str], printed_json: Callable[..., Any]
@@ -78,6 +79,7 @@ def test_one_of_several_runs_behind_a_link_is_not_removed(two_runs: Path, compla
     assert (there / "real/seed0/result.json").exists()
 
 
+@pytest.mark.slow
 def test_links_that_lead_in_a_circle_end(two_runs: Path, capsys: pytest.CaptureFixture[str]):
     (two_runs / "runs/exp/around").symlink_to("..")
     (two_runs / "runs/first").symlink_to("second")

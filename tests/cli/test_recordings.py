@@ -24,6 +24,7 @@ def here(two_runs: Path) -> Path:
     return two_runs
 
 
+@pytest.mark.slow
 def test_recordings_are_listed_with_their_properties(here: Path, capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
     assert main.main(["recordings", "list"]) == 0
@@ -41,6 +42,7 @@ def test_recordings_are_listed_with_their_properties(here: Path, capsys: pytest.
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_recordings_are_selected_in_the_words_of_view(
     here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
 ):
@@ -99,6 +101,7 @@ def test_check_compares_files_with_the_manifest_of_their_run(here: Path, capsys:
     assert f"{file}: does not have the SHA-256 that was stored for it" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_recording_is_exported_as_a_film_and_a_table(here: Path, capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
     words = ["recordings", "export", f"{FOLDER}/test-0000.rrd", "--quiet", "--into"]
@@ -109,6 +112,7 @@ def test_a_recording_is_exported_as_a_film_and_a_table(here: Path, capsys: pytes
     assert pd.read_csv("grasp.csv")["reward"].sum() == 20.0
 
 
+@pytest.mark.slow
 def test_an_impossible_export_is_one_line(here: Path, complaint: Callable[..., str], monkeypatch: pytest.MonkeyPatch):
     words = ["recordings", "export", f"{FOLDER}/test-0000.rrd", "--quiet", "--into"]
     assert "choose from .mp4, .gif, .csv, .parquet" in complaint(*words, "grasp.avi")

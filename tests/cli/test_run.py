@@ -46,6 +46,7 @@ def test_a_run_trains_all_seeds_together(
     assert "toy-0.3" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_seeds_that_are_trained_are_not_trained_again(here: Path, printed_json: Callable[..., Any]):
     assert main.main(run(TOY, "--seed", "1")) == 0
     before = tiny_training.contents(here / "runs" / "toy-0.1" / "synthetic" / "seed1")
@@ -73,6 +74,7 @@ def test_a_policy_transfer_acts_with_the_weights_of_its_source_policy(
     assert "holds a run with other weights" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_dry_run_prints_what_is_left_and_writes_nothing(
     here: Path, printed_json: Callable[..., Any], capsys: pytest.CaptureFixture[str]
 ):
@@ -155,6 +157,7 @@ def test_settings_that_cannot_be_flags_are_one_line(
     assert expected in complaint("run", "--method", "odd.py:Odd", *FAST)
 
 
+@pytest.mark.slow
 def test_published_rows_of_the_same_splits_and_physics_stand_beside_the_new_ones(
     here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
@@ -175,6 +178,7 @@ def test_published_rows_of_the_same_splits_and_physics_stand_beside_the_new_ones
     assert origins() == {"nothing": "this run"}
 
 
+@pytest.mark.slow
 def test_every_configuration_has_a_folder_and_a_row(
     here: Path, printed_json: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ):
@@ -199,6 +203,7 @@ def test_every_configuration_has_a_folder_and_a_row(
     assert len(printed_json("leaderboard", "show")) == 4
 
 
+@pytest.mark.slow
 def test_tracks_are_rows_beside_the_plain_ones(
     here: Path, printed_json: Callable[..., Any], capsys: pytest.CaptureFixture[str]
 ):

@@ -69,6 +69,7 @@ def test_runs_are_listed_with_scores_and_states(runs: Callable[..., str]):
     assert "100.0 %" in runs("list", "--method", "exp")
 
 
+@pytest.mark.slow
 def test_a_run_is_shown_and_compared(runs: Callable[..., str]):
     assert json.loads(runs("show", "exp", "--json"))["splits"] == [
         {"split": "test", "seeds": 1, "rows": 2, "return": 20.0, "success": 1.0}
@@ -88,6 +89,7 @@ def test_a_run_is_shown_and_compared(runs: Callable[..., str]):
     assert runs("best", "--split", "test") == "mine/synthetic: return 0.00, success 0.0 % on test\n"
 
 
+@pytest.mark.slow
 def test_runs_are_marked(runs: Callable[..., str]):
     runs("tag", "exp", "good", "old")
     runs("tag", "exp", "old", "--remove")
@@ -96,6 +98,7 @@ def test_runs_are_marked(runs: Callable[..., str]):
     assert (row["run"], row["tags"], row["note"]) == ("exp/synthetic", ["good"], "the ceiling")
 
 
+@pytest.mark.slow
 def test_runs_are_archived_and_removed_only_when_that_is_confirmed(
     here: Path, runs: Callable[..., str], capsys: pytest.CaptureFixture[str]
 ):
@@ -109,6 +112,7 @@ def test_runs_are_archived_and_removed_only_when_that_is_confirmed(
     assert {row["run"] for row in json.loads(runs("list", "--json"))} == {"broken/synthetic", "mine-near0.2/synthetic"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "line"),
     [

@@ -62,6 +62,7 @@ def play_shares(words: tuple[str, ...], of: int, into: Path) -> None:
     put_together(parts, into)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "pieces"), [("exp", 3), ("nothing", 3), ("random", 2)])
 def test_the_bytes_are_the_same_for_any_number_of_shares(
     here: Path, capsys: pytest.CaptureFixture[str], method: str, pieces: int
@@ -93,6 +94,7 @@ def test_a_merge_plays_nothing_and_may_be_repeated(here: Path, monkeypatch: pyte
     assert contents(here / "runs") == files
 
 
+@pytest.mark.slow
 def test_the_command_without_a_share_plays_only_what_is_missing(here: Path, monkeypatch: pytest.MonkeyPatch):
     words = RUN
     play(words, "--runs", here / "whole")
@@ -106,6 +108,7 @@ def test_the_command_without_a_share_plays_only_what_is_missing(here: Path, monk
     assert contents(here / "runs") == contents(here / "whole")
 
 
+@pytest.mark.slow
 def test_pieces_of_two_machines_give_the_same_scores_and_name_both(here: Path, monkeypatch: pytest.MonkeyPatch):
     words = (*RUN, "--record", "0")
     play(words, "--runs", here / "whole")
@@ -143,6 +146,7 @@ def edited(file: Path, **entries: Any) -> None:
     file.write_text(json.dumps(json.loads(file.read_text()) | entries))
 
 
+@pytest.mark.slow
 def test_doubled_foreign_and_damaged_pieces_are_named(here: Path, complaint: Callable[..., str]):
     words = (*RUN, "--record", "0")
     for command in (("--merge",), (), ("--share", "0/2")):
@@ -170,6 +174,7 @@ def test_doubled_foreign_and_damaged_pieces_are_named(here: Path, complaint: Cal
         assert f"{PIECES}/test-0000-0000.json is damaged" in complaint(*words, *command)
 
 
+@pytest.mark.slow
 def test_a_share_that_was_killed_leaves_no_half_piece(here: Path, monkeypatch: pytest.MonkeyPatch):
     words = (*RUN, "--record", "0")
     play(words, "--runs", here / "whole")
@@ -219,6 +224,7 @@ def test_a_setting_of_a_method_cannot_hide_a_flag_of_the_group(here: Path, compl
         )
 
 
+@pytest.mark.slow
 def test_a_share_trains_nothing(here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]):
     tiny_training.install(tiny_training.write(here / "data"), monkeypatch.setattr)
     words = ("run", "--method", TOY, "--preset", "smoke", "--quiet", "--record", "0", "--split", "test")
@@ -241,6 +247,7 @@ def test_a_share_trains_nothing(here: Path, monkeypatch: pytest.MonkeyPatch, com
     assert contents(here / "together") == contents(here / "alone")
 
 
+@pytest.mark.slow
 def test_shares_verify_a_board_as_one_process_does(here: Path, capsys: pytest.CaptureFixture[str]):
     for method in ("exp", "nothing"):
         play(("run", "--method", method, "--quiet", "--record", "0"))
@@ -262,6 +269,7 @@ def test_shares_verify_a_board_as_one_process_does(here: Path, capsys: pytest.Ca
     assert not (here / "runs/verify/pieces").exists()
 
 
+@pytest.mark.slow
 def test_a_submission_in_shares_is_the_same_bundle(
     here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]
 ):

@@ -66,6 +66,7 @@ def test_the_conditions_of_a_split_change_its_episodes(
     assert not plain & changed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("split", SPLITS)
 @pytest.mark.parametrize(
     "words",

@@ -58,6 +58,7 @@ def start(*words: str, code: str = TABLES, shell: str = "", **environment: str) 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [METHODS, ["--help"], ["run", "--help"], ["--version"], [*METHODS, "--json"]])
 def test_a_reader_that_leaves_is_no_error(words: list[str]):
     """Rich ends the process with code 1 if it is the first to notice, and Python at its end with code 120."""
@@ -86,6 +87,7 @@ def test_a_full_disk_behind_stdout_is_one_line():
     assert start("nosuch", shell="2>/dev/full").returncode == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_closed_stream_is_one_that_leads_nowhere(closed: str, tmp_path: Path):
     """The next file that is opened would otherwise get its number, and what is printed."""
@@ -97,6 +99,7 @@ def test_a_closed_stream_is_one_that_leads_nowhere(closed: str, tmp_path: Path):
     assert b"Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["runs", "methods"], ["--help"], ["run", "--help"], ["runs", "list", "--help"]])
 def test_a_locale_without_utf_8_gets_escapes_and_no_error(words: list[str]):
     done = start(*words, **LATIN)
@@ -113,6 +116,7 @@ def test_a_name_that_the_locale_lacks_is_blamed_on_the_locale():
     assert b"has letters that this locale lacks; set LC_ALL=C.UTF-8" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [{"COLUMNS": "40"}, {"COLUMNS": "abc"}, {"TERM": "dumb"}, {"NO_COLOR": "1"}])
 def test_the_size_and_kind_of_a_terminal_change_no_exit_code(more: dict[str, str]):
     for words in (["runs", "methods"], ["--help"]):
@@ -120,6 +124,7 @@ def test_the_size_and_kind_of_a_terminal_change_no_exit_code(more: dict[str, str
         assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.slow
 def test_json_stands_alone_on_stdout_though_the_agent_prints(tiny_world: Path):
     (tiny_world / "mine.py").write_text(LOUD)
     words = ["run", "--method", "mine.py:Mine", "--split", "test", "--quiet", "--record", "0", "--json"]

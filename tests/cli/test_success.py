@@ -23,6 +23,7 @@ def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return training_world
 
 
+@pytest.mark.slow
 def test_a_data_set_with_policies_and_a_model_trained_on_it(here: Path, capsys: pytest.CaptureFixture[str]):
     run = ["run", "--method", "bc", "--preset", "smoke", "--split", "test", "--quiet", "--record", "0"]
     assert main.main(run) == 0

@@ -112,6 +112,7 @@ def test_the_scores_are_drawn_against_the_setting(here: Path, monkeypatch: pytes
     assert values == [(0.95, False), (float(SOLVES), True)]
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_continues_with_equal_results(here: Path, monkeypatch: pytest.MonkeyPatch):
     def run(runs: str) -> int:
         words = ["--preset", "smoke", "--search", "rate=0.01..1:log", "--trials", "3", "--seed", "0", "1"]

@@ -38,6 +38,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return shown
 
 
+@pytest.mark.slow
 def test_without_a_filter_all_existing_recordings_are_opened(here: Path, opened: list[str]):
     assert main.main(["view"]) == 0
     assert main.main(["view", "runs/exp/synthetic/seed0"]) == 0
@@ -62,6 +63,7 @@ def test_the_worst_and_the_best_are_opened_together_and_listed(
     assert (recorded.episode.score, len(recorded.episode.actions)) == (row["score"], row["length"])
 
 
+@pytest.mark.slow
 def test_print_lists_the_files(here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]):
     capsys.readouterr()
     words = ["--failed", "--print", "--method", "nothing", "--split", "test", "--reaches", "synthetic", "--seed", "0"]
@@ -106,6 +108,7 @@ def test_the_browser_opens_all_files_together(
     assert "--live shows its window on a screen" in complaint("view", "runs/exp", "--live", "--web")
 
 
+@pytest.mark.slow
 def test_damaged_recordings_are_listed_and_the_others_are_opened(
     here: Path, opened: list[str], capsys: pytest.CaptureFixture[str]
 ):
@@ -152,6 +155,7 @@ def test_an_error_is_one_line(here: Path, opened: list[str], complaint: Callable
     assert opened == []
 
 
+@pytest.mark.slow
 def test_two_runs_appear_side_by_side_on_a_row_that_only_one_solves(here: Path, opened: list[str]):
     assert main.main(["view", "--diff", "runs/exp", NOTHING]) == 0
     assert opened == ["runs/pairs/exp-0--nothing-0--test-0000.rrd"]
@@ -167,6 +171,7 @@ def test_an_impossible_pair_is_one_line(here: Path, complaint: Callable[..., str
     assert "no episode has row 7" in complaint("view", "--diff", "runs/exp", NOTHING, "--row", "7")
 
 
+@pytest.mark.slow
 def test_a_policy_plays_live(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
 ):

@@ -10,6 +10,7 @@ import pytest
 from dextron_bench.cli import main
 
 
+@pytest.mark.slow
 def test_the_choices_of_a_rule_and_of_the_expert_are_drawn(tiny_world: Path, capsys: pytest.CaptureFixture[str]):
     words = ["windows", "reflex", "--split", "val", "--threads", "1", "--quiet", "--into", "pictures/windows.svg"]
     assert main.main(words) == 0

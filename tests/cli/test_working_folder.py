@@ -77,6 +77,7 @@ def imported(folder: Path, *words: str, seconds: float = LONGEST) -> list[str]:
     return sorted(file.name for file in folder.glob("**/imported-*"))
 
 
+@pytest.mark.slow
 def test_a_command_that_starts_the_viewer_imports_nothing_from_the_working_folder(planted: Path):
     assert imported(planted, "view", "--web", "--port", "0", "one.rrd") == []
     assert b"viewer" not in (planted / "errors").read_bytes()

@@ -189,6 +189,7 @@ ALL = list(commands())
 EVERY = pytest.mark.parametrize(("command", "cls"), ALL, ids=["-".join(words) for words, _ in ALL])
 
 
+@pytest.mark.slow
 @EVERY
 def test_a_wrong_value_is_never_an_unexpected_error(
     command: tuple[str, ...], cls: Any, folder: Path, capsys: pytest.CaptureFixture[str]

@@ -56,6 +56,7 @@ def play(*words: str | Path) -> None:
     assert main.main([*map(str, words)]) == 0
 
 
+@pytest.mark.slow
 def test_a_search_and_a_run_have_the_same_bytes(here: Path):
     for words in (("data", "mc", "--rows", "3"), ("run", "--method", "exp", "--split", "test")):
         play(*words, "--quiet", "--threads", "1", "--runs", "whole")
@@ -64,6 +65,7 @@ def test_a_search_and_a_run_have_the_same_bytes(here: Path):
     assert {name: text for name, text in contents(here / "runs").items() if name in files} == files
 
 
+@pytest.mark.slow
 def test_a_training_goes_on_task_by_task(here: Path, monkeypatch: pytest.MonkeyPatch):
     """A task ends at each checkpoint, after epochs 2, 4 and 5, and one loses its node."""
     monkeypatch.setattr(trainings, "SECONDS", 0.0)
@@ -103,6 +105,7 @@ def test_a_piece_of_another_version_of_the_work_is_not_played(here: Path):
         pieces.play_piece(*arguments)
 
 
+@pytest.mark.slow
 def test_a_data_set_has_the_same_bytes(here: Path):
     words = ("success", "data", "--rows", "300", "--quiet")
     play(*words, "--threads", "1", "--runs", "whole")
@@ -112,6 +115,7 @@ def test_a_data_set_has_the_same_bytes(here: Path):
     assert not (here / "runs/success/synthetic/seed0/pieces").exists()
 
 
+@pytest.mark.slow
 def test_a_submission_is_the_same_bundle(here: Path, complaint: Callable[..., str]):
     words = ("submit", constant_agent(here, "0.1", "steady"), "--name", "mine", "--seed", "0", "--quiet")
     words += ("--record", "0", "--timeout", "300")

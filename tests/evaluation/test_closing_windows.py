@@ -68,6 +68,7 @@ def test_a_hand_that_never_closes_has_no_choice(monkeypatch: pytest.MonkeyPatch)
     assert not choice.success
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [ROW, replace(ROW, bottles=(HEAVY,))], ids=["plain", "heavy"])
 def test_the_choice_of_an_agent_that_closes_once_is_its_first_closing_action_and_its_window_predicts_it(row: Rows):
     """`reflex` opens and closes at full speed, as a fork does, so the window says how its episode ends."""

@@ -175,6 +175,7 @@ def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return training_world
 
 
+@pytest.mark.slow
 def test_from_the_command_line(here: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]):
     words = ["data", "export", "--into", "sets", "--split", "test"]
     assert main.main([*words, "--json"]) == 0

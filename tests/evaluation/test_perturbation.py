@@ -78,6 +78,7 @@ def test_episodes_do_not_depend_on_slots_or_order(name: str):
             np.testing.assert_array_equal(together[k].actions, other.actions)
 
 
+@pytest.mark.slow
 def test_tracks_differ_from_plain_episodes_and_a_track_without_conditions_does_not():
     plain, unconditional = played(PLAIN), played(Track("nothing"))
     for k in range(len(CASES)):

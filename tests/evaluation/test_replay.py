@@ -15,6 +15,7 @@ from tests.helpers.short_reaches import SETTINGS, SOURCE, actions, played
 ROUND = np.round(actions(0)[:, 0], 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [ROUND, ROUND[:, None], ROUND.tolist(), tuple(ROUND), ROUND[:, None].tolist()])
 def test_actions_may_have_every_form_of_a_sequence(form: Any):
     expected, episode = (dict(replay(SOURCE, SETTINGS[:1], [sent], threads=1))[0] for sent in (ROUND, form))

@@ -35,6 +35,7 @@ def play(agent, cases=CASES, **options) -> dict[int, Episode]:
     return dict(rollout(agent, SOURCE, cases, threads=1, **options))
 
 
+@pytest.mark.slow
 def test_every_case_is_played_once_and_equally_for_any_number_of_slots():
     one, all_at_once = play(ExpertAgent(), slots=1), play(ExpertAgent(), slots=3)
     assert sorted(one) == sorted(all_at_once) == [0, 1, 2]
@@ -73,6 +74,7 @@ def test_an_invalid_action_fails_the_episode_and_is_named(value, reason):
     assert [episode.score for episode in episodes.values()] == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slots", [1, 2, 3])
 def test_a_simulation_that_diverges_fails_its_episode_and_is_named(slots):
     """MuJoCo resets such a simulation by itself; the episode continued with the bottle and hand at their origins."""
@@ -91,6 +93,7 @@ def test_a_simulation_that_diverges_fails_its_episode_and_is_named(slots):
         assert (episodes[index].failure, episodes[index].score) == ("", alone.score)
 
 
+@pytest.mark.slow
 def test_a_fault_does_not_change_other_episodes():
     class FailsInRow1(ExpertAgent):
         def act(self, states):
@@ -110,6 +113,7 @@ def test_a_fault_in_a_later_step_names_the_step():
     assert len(episode.actions) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [np.nextafter(1.0, 2.0), 1.0 + 1e-6, np.float32(1.0000001), -1.0 - 1e-6])
 def test_an_action_that_rounding_put_outside_the_range_is_clipped_and_stored_clipped(value):
     """RescaleAction of Gymnasium ends at 1.0000000000000002 for a third of all ranges."""

@@ -32,6 +32,7 @@ def alone() -> tuple[np.ndarray, np.ndarray]:
     return scores.reshape(2, -1), lengths.reshape(2, -1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("slots", "threads"), [(5, 1), (7, 2), (64, 2)])
 def test_experts_played_together_and_one_by_one_have_equal_outcomes(alone, slots, threads):
     outcomes = play(range(2), CRITICALS, slots, threads)

@@ -91,6 +91,7 @@ def test_rows_are_the_same_at_any_slots_and_threads_and_after_interruptions(tmp_
     pd.testing.assert_frame_equal(search(broken, rows=2), whole)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_episodes")
 @pytest.mark.parametrize("of", [1, 2, 3])
 def test_shares_of_any_number_and_order_find_the_same_bytes(of: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -26,6 +26,7 @@ def test_names_that_equal_or_resemble_another_are_refused(name: str, tmp_path: P
     add.check_name("first-of-mine", "synthetic", tmp_path, replace=False)
 
 
+@pytest.mark.slow
 def test_the_board_changes_in_one_step_and_nothing_else_is_left(
     forged: Forgery, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -55,6 +56,7 @@ def test_the_board_changes_in_one_step_and_nothing_else_is_left(
     assert not list(tmp_path.glob(".board*"))
 
 
+@pytest.mark.slow
 def test_the_board_keeps_the_code_of_a_submission_and_records_a_success_and_a_failure(forged: Forgery, tmp_path: Path):
     """The agent solves a row and fails another one; the page links to both recordings and to its code."""
     board = tmp_path / "board"

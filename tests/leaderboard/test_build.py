@@ -37,6 +37,7 @@ def build(*words: str) -> int:
     return main.main(["leaderboard", "build", "--board", "board", *words])
 
 
+@pytest.mark.slow
 def test_results_curves_and_weights_are_copied_unchanged(here: Path):
     assert build("--runs", "runs") == 0
     run, published = here / "runs/toy-0.1/synthetic/seed1", here / "board/results/toy-0.1/synthetic/seed1"
@@ -66,6 +67,7 @@ def test_the_tables_are_computed_from_the_results(here: Path):
     assert (here / "board/curves-synthetic.png").stat().st_size > 5000
 
 
+@pytest.mark.slow
 def test_handwritten_text_stays_and_a_second_build_changes_nothing(here: Path):
     assert build("--runs", "runs") == 0
     readme = here / "board/README.md"
@@ -78,6 +80,7 @@ def test_handwritten_text_stays_and_a_second_build_changes_nothing(here: Path):
     assert readme.read_text() == before
 
 
+@pytest.mark.slow
 def test_an_unfinished_run_is_not_published(here: Path, complaint: Callable[..., str]):
     for file in (here / "runs").glob("*/*/seed*/result.json"):
         result = json.loads(file.read_text())
@@ -88,6 +91,7 @@ def test_an_unfinished_run_is_not_published(here: Path, complaint: Callable[...,
     assert not (here / "board").exists()
 
 
+@pytest.mark.slow
 def test_the_tier_stays_until_the_scores_change(here: Path):
     assert build("--runs", "runs") == 0
     file = here / "board/results/nothing/synthetic/seed0/result.json"
@@ -101,6 +105,7 @@ def test_the_tier_stays_until_the_scores_change(here: Path):
     assert "tier" not in json.loads(file.read_text())
 
 
+@pytest.mark.slow
 def test_val_of_a_learner_is_not_published_because_its_snapshot_was_chosen_there(here: Path):
     for method in (TOY, "nothing"):
         words = ["--preset", "quick"] if method == TOY else []
@@ -114,6 +119,7 @@ def test_val_of_a_learner_is_not_published_because_its_snapshot_was_chosen_there
     assert sorted(splits["nothing"]) == ["test", "unseen-reach", "val"]
 
 
+@pytest.mark.slow
 def test_what_a_verification_adds_to_a_result_does_not_change_the_hash_of_the_run(here: Path):
     assert build("--runs", "runs") == 0
     file = here / "board/results/nothing/synthetic/seed0/result.json"
@@ -126,6 +132,7 @@ def test_what_a_verification_adds_to_a_result_does_not_change_the_hash_of_the_ru
     assert collect.run_digest(file) != digest
 
 
+@pytest.mark.slow
 def test_no_cell_of_the_table_is_a_formula_and_nothing_hidden_is_published(here: Path):
     assert build("--runs", "runs") == 0
     file = here / "board/results/nothing/synthetic/seed0/result.json"

@@ -48,6 +48,7 @@ def verification(*more: str) -> list[str]:
     return ["leaderboard", "verify", "--all", "--board", "board", "--quiet", *more]
 
 
+@pytest.mark.slow
 def test_all_baselines_play_one_draw_and_it_is_kept(board: Path, drawn: list[str], capsys: pytest.CaptureFixture[str]):
     assert main.main(words("--beacon", "a", "--method", "nothing")) == 0
     assert main.main(words()) == 0  # The other method, on the settings of the board.

@@ -22,6 +22,7 @@ def runs(two_runs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return two_runs / "runs"
 
 
+@pytest.mark.slow
 def test_each_method_has_its_shortest_episodes_and_each_kind_its_clearest(runs: Path):
     chosen = highlights.choose(runs, ["synthetic"], "test", rows=100)
     names = chosen["name"].tolist()

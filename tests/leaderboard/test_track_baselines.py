@@ -28,6 +28,7 @@ def words(*more: str) -> list[str]:
     return ["leaderboard", "tracks", "--reaches", "synthetic", "--board", "board", "--quiet", *more]
 
 
+@pytest.mark.slow
 def test_rows_play_each_track_once_and_keep_it(board: Path, capsys: pytest.CaptureFixture[str]):
     before = collect.run_digest(board / RESULT)
     assert main.main(words("--method", "reflex", "--track", "delay-100")) == 0

@@ -72,6 +72,7 @@ def test_missing_and_additional_seeds_on_the_board_are_problems(
     assert "has seed0, but its manifest has seed0, seed1" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_an_interrupted_addition_can_be_repeated(submitted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     board, words = tmp_path / "board", ["leaderboard", "add", str(submitted / "near.zip"), "--board"]
     assert main.main([*words, str(board)]) == 0
@@ -85,6 +86,7 @@ def test_an_interrupted_addition_can_be_repeated(submitted: Path, tmp_path: Path
     assert not (tmp_path / ".board.part").exists()
 
 
+@pytest.mark.slow
 def test_view_records_any_episode_of_a_bundle(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):

@@ -28,6 +28,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_each_layout_has_its_own_application_id(tmp_path: Path) -> None:
     """The viewer has one layout for each application id: the layout of the last file that it opened."""
     files = [tmp_path / name for name in ("plain.rrd", "predicted.rrd", "pair.rrd")]

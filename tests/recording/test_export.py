@@ -56,6 +56,7 @@ def test_a_table_holds_every_step_bit_for_bit(recorded: Path, tmp_path: Path, su
     assert os.listdir(file.parent) == [file.name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_the_suffix_decides_the_format_of_a_film(recorded: Path, tmp_path: Path, suffix: str):
     progress, file = [], tmp_path / f"film{suffix}"
@@ -99,6 +100,7 @@ def test_a_damaged_recording_is_not_exported(recorded: Path, tmp_path: Path):
     assert os.listdir(tmp_path) == ["cut.rrd"]
 
 
+@pytest.mark.slow
 def test_frames_of_a_film_are_close_to_stills():
     states = episode(1).states
     with renderer.Renderer(32, 24, supersampling=2) as frame_renderer:

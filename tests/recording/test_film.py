@@ -58,6 +58,7 @@ def test_a_film_shows_these_steps_at_this_rate(count: int, rate: float, speed: f
     assert recording_film.shown_steps(count, rate, speed) == (shown, pytest.approx(fps))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("write", "count"), [(recording_film.mp4, 26), (recording_film.gif, 14)])
 def test_a_film_takes_as_long_as_the_episode_and_shows_it(tmp_path: Path, write: Callable[..., None], count: int):
     file, progress = tmp_path / f"film.{write.__name__}", []
@@ -72,6 +73,7 @@ def test_a_film_takes_as_long_as_the_episode_and_shows_it(tmp_path: Path, write:
     assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_slow_motion_takes_longer(tmp_path: Path):
     recording_film.gif(tmp_path / "slow.gif", lifting(4), FilmStyle(64, 48, speed=0.3))
     frames, duration = read_film(tmp_path / "slow.gif")

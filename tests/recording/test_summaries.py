@@ -100,6 +100,7 @@ def test_other_applications_other_versions_and_damage_have_different_messages(wh
     assert reported[3] == ""
 
 
+@pytest.mark.slow
 def test_a_changed_value_is_noticed_if_all_of_the_file_is_read(whole: Path, tmp_path: Path):
     changed = tmp_path / "changed.rrd"
     content = bytearray(whole.read_bytes())
@@ -173,6 +174,7 @@ def test_recordings_are_read_on_a_machine_with_many_processors(whole: Path, tmp_
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_recording_without_a_footer_of_a_version_that_writes_none_is_read(whole: Path, tmp_path: Path):
     """Rerun 0.26 ends a file with no footer."""
     file, content = tmp_path / "older.rrd", whole.read_bytes()

@@ -43,6 +43,7 @@ def test_a_second_execution_computes_nothing_and_changes_no_byte(tmp_path: Path,
     assert (folder / "times.json").read_bytes() == times
 
 
+@pytest.mark.slow
 def test_a_run_killed_between_splits_ends_with_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     unbroken = contents(execute(tmp_path / "unbroken", PLAN))
 

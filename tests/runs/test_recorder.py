@@ -47,6 +47,7 @@ def write_all(writer: Recorder, folder: Path) -> dict[str, str]:
     return {file.name: sha256 for file, sha256 in writer.hashes().items()}
 
 
+@pytest.mark.slow
 def test_processes_write_what_this_process_writes(tmp_path: Path, two: Recorder, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(recorder, "AHEAD", 1)  # The third recording waits for the first one.
     (tmp_path / "beside").mkdir()
@@ -64,6 +65,7 @@ def test_processes_write_what_this_process_writes(tmp_path: Path, two: Recorder,
         assert (one.episode.states == other.episode.states).all()
 
 
+@pytest.mark.slow
 def test_a_recording_that_cannot_be_written_is_named(tmp_path: Path, two: Recorder):
     (tmp_path / "taken").write_text("")
     two.write(tmp_path / "taken" / "0.rrd", CASES[0], EPISODES[0], {})

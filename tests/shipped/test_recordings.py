@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from dextron_bench import recording
 from dextron_bench.evaluation.replay import replay
 from dextron_bench.reaches import sources
@@ -19,6 +21,7 @@ def test_the_shipped_recordings_are_small():
     assert {f"case-{kind}" for kind in KINDS} <= {file.stem for file in FILES}
 
 
+@pytest.mark.slow
 def test_the_shipped_recordings_are_undamaged_and_have_the_properties_of_their_run():
     for summary in recording.summarise(FILES, whole=True):
         assert not summary.damage, summary
@@ -30,6 +33,7 @@ def test_the_shipped_recordings_are_undamaged_and_have_the_properties_of_their_r
             assert (summary.properties["outcome"] == "success") == (outcome == "success")
 
 
+@pytest.mark.slow
 def test_a_replay_of_the_shipped_recordings_gives_the_same_returns():
     episodes = [recording.read(file).episode for file in FILES]
     settings, actions = zip(*((episode.setting, episode.actions[:, 0]) for episode in episodes), strict=True)

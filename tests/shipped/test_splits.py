@@ -79,6 +79,7 @@ def test_all_splits_except_train_have_different_rows(shipped: dict, reaches: str
         assert not rows.duplicated().any()
 
 
+@pytest.mark.slow
 @each_source
 def test_no_setting_is_near_equal_to_a_setting_of_another_split(shipped: dict, reaches: str):
     train = settings(shipped[reaches, "train"])
@@ -119,6 +120,7 @@ def test_minjerk_has_each_reach_once_and_trains_on_the_listed_ones(shipped: dict
     assert {case.expert for name in reaches for case in shipped["minjerk", name].cases} == {building_minjerk.EXPERT}
 
 
+@pytest.mark.slow
 @each_split
 def test_every_source_has_the_reaches_of_its_splits(
     shipped: dict, reaches: str, name: str, opened: Callable[[str], Source]

@@ -110,6 +110,7 @@ def minjerk() -> dict[str, pd.DataFrame]:
     return building_minjerk.draw(MinjerkSource(), Engine(8, 1), 0, FEW)
 
 
+@pytest.mark.slow
 def test_minjerk_trains_on_listed_reaches_and_evaluates_on_others(minjerk):
     assert {name: len(rows) for name, rows in minjerk.items()} == {"train": 2, "val": 1, "test": 2}
     reaches = [name for rows in minjerk.values() for name in rows["reach"]]
@@ -118,6 +119,7 @@ def test_minjerk_trains_on_listed_reaches_and_evaluates_on_others(minjerk):
     assert [name in listed for name in reaches] == [True] * 2 + [False] * 3
 
 
+@pytest.mark.slow
 def test_the_expert_of_minjerk_solves_all_rows_and_the_order_is_drawn(minjerk):
     source, rows = MinjerkSource(), pd.concat(minjerk.values())
     assert set(zip(rows["gain"], rows["critical"], strict=True)) == {(2.0, 0.15)}

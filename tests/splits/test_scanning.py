@@ -26,6 +26,7 @@ def test_window_and_best_critical_distance_of_a_scan():
     np.testing.assert_allclose(scanning.best_critical(scores), 0.01 + 0.89 * np.array([2.5, 2.5, 3.5]) / 8)
 
 
+@pytest.mark.slow
 def test_a_scan_plays_each_row_with_its_own_gain():
     scanner = Scanner(MinjerkSource(), Engine(6, 1))
     scores = scanner.scan(rows([2.0, 1.0]), points=3)
@@ -55,6 +56,7 @@ def played(tmp_path, monkeypatch) -> list[int]:
     return sizes
 
 
+@pytest.mark.slow
 def test_what_was_played_is_read_again(tmp_path, played):
     first = Scanner(MinjerkSource(), Engine(6, 1), tmp_path).scan(rows([2.0, 1.0, 1.5]), points=2)
     assert played == [4, 2]

@@ -131,6 +131,7 @@ def simultaneous(folder: Path, seeds: Sequence[int], *names: str) -> list[list[s
         return answers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("process_one",), ("process_one", "no_links")], ids="+".join)
 def test_processes_with_one_number_write_one_config(tmp_path: Path, names: tuple[str, ...]):
     """Two containers that share a folder are both process 1; none loses a temporary file to the other one."""
@@ -139,6 +140,7 @@ def test_processes_with_one_number_write_one_config(tmp_path: Path, names: tuple
         assert sorted(os.listdir(tmp_path / str(number))) == ["config.json", "provenance.json", "times.json"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("process_one",), ("process_one", "no_links")], ids="+".join)
 def test_of_two_configs_written_at_the_same_time_one_wins_and_the_other_is_refused(
     tmp_path: Path, names: tuple[str, ...]

@@ -62,6 +62,7 @@ def test_hidden_names_are_not_listed(tmp_path: Path):
     assert folders.visible(tmp_path / "none", "*") == []
 
 
+@pytest.mark.slow
 def test_only_one_module_lists_folders():
     def lists(file: Path) -> bool:
         nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))

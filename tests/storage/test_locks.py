@@ -70,6 +70,7 @@ def take(file: Path, *names: str) -> str:
     return done.stderr.strip().splitlines()[-1] if done.stderr else ""
 
 
+@pytest.mark.slow
 @everywhere
 def test_one_process_holds_a_lock_and_others_learn_which(tmp_path: Path, names: tuple[str, ...]):
     file = tmp_path / ".locked"
@@ -83,6 +84,7 @@ def test_one_process_holds_a_lock_and_others_learn_which(tmp_path: Path, names: 
     assert (locks.is_held(file), locks.text(file)) == (False, None)
 
 
+@pytest.mark.slow
 @everywhere
 def test_the_lock_of_a_killed_process_is_taken_over(tmp_path: Path, names: tuple[str, ...]):
     file = tmp_path / ".locked"
@@ -102,6 +104,7 @@ def test_a_killed_process_whose_parent_has_not_noticed_holds_nothing(tmp_path: P
         assert not locks.is_held(file)
 
 
+@pytest.mark.slow
 @everywhere
 def test_two_processes_never_hold_a_lock_at_the_same_time(tmp_path: Path, names: tuple[str, ...]):
     lock, counter = tmp_path / ".locked", tmp_path / "counter"
@@ -176,6 +179,7 @@ def test_a_lock_that_was_removed_by_hand_and_taken_stays_with_its_new_holder(tmp
     assert not locks.is_held(file)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", ["ENOSYS", "EOPNOTSUPP", "ENOLCK", "EINVAL"])
 def test_every_answer_of_a_file_system_without_flock_is_understood(tmp_path: Path, error: str):
     with pytest.MonkeyPatch.context() as patch:

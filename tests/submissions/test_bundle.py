@@ -84,6 +84,7 @@ def test_links_duplicates_and_unlisted_files_are_refused(submitted: Path, unsafe
     assert "holds agent/more.py, which its manifest does not list" in unlisted.refused(tmp_path / "into")
 
 
+@pytest.mark.slow
 def test_a_zip_bomb_is_refused_before_it_is_unpacked(unsafe: Unsafe, tmp_path: Path):
     bomb = unsafe.add("agent/zeros.pt", bytes(bundle.LARGEST + 1))
     assert "agent/zeros.pt is too large when unpacked (256 MiB)" in bomb.refused(tmp_path / "into")
@@ -173,12 +174,14 @@ def test_json_is_limited_before_it_is_parsed(unsafe: Unsafe, tmp_path: Path):
         bundle.parse(b" " * (bundle.LARGEST_JSON + 1), "result", tmp_path / "result.json")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"[" * 100_000, b'{"seed": ' + b"9" * 5000 + b"}", b"\xff", b"{} {}", b"[NaN]"])
 def test_json_that_harms_its_reader_is_refused(content: bytes, tmp_path: Path):
     with pytest.raises(bundle.BadBundle, match=r"mine\.json"):
         bundle.parse(content, "bundle", Path("mine.json"))
 
 
+@pytest.mark.slow
 def test_a_check_of_json_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch):
     """A million seeds: the schema looks at each of them."""
     monkeypatch.setattr(bundle, "SECONDS", 3.0)

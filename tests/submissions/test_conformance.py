@@ -35,6 +35,7 @@ def check(tmp_path: Path, act: str) -> dict[str, Check]:
     return {check.what: check for check in checks(launch, limits=Limits(answer=20.0))}
 
 
+@pytest.mark.slow
 def test_the_template_passes_the_checks_and_its_own_test(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     folder = tmp_path / "mine"
     assert main.main(["new-agent", str(folder)]) == 0

@@ -17,6 +17,7 @@ from tests.helpers import tiny_benchmark
 from tests.helpers.forged_bundles import Forgery, row
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -81,6 +82,7 @@ def test_a_table_that_takes_too_long_is_refused(forged: Forgery, monkeypatch: py
         episode_tables.read(forged.seed / "episodes.parquet", [])
 
 
+@pytest.mark.slow
 def test_a_table_with_a_changed_footer_is_refused_or_equal(forged: Forgery):
     """The memory of the reader stays below its limit, whatever count the bytes state."""
     file = forged.seed / "episodes.parquet"

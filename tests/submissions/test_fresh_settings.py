@@ -63,6 +63,7 @@ def board(merged: Path, drawn: None, tmp_path: Path) -> Path:
     return shutil.copytree(merged, tmp_path / "board")
 
 
+@pytest.mark.slow
 def test_the_scores_on_fresh_settings_name_what_they_follow_from(board: Path):
     result = json.loads((board / "results/near/synthetic/seed0/result.json").read_text())
     played = result["fresh"]
@@ -103,6 +104,7 @@ def test_fresh_scores_of_the_board_are_verified(board: Path):
     assert findings(board, redraw=False) == ["its scores on fresh settings differ from its actions, played again"]
 
 
+@pytest.mark.slow
 def test_settings_that_do_not_follow_from_the_beacon_are_a_problem(board: Path):
     """Another beacon is claimed: plain verification replays the actions, and only a new draw shows the difference."""
     file = board / "results/near/synthetic/seed0/result.json"

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from dextron_bench import recording
 from dextron_bench.reaches import sources
 from tests.helpers import tiny_benchmark
 from tests.helpers.forged_bundles import Forgery
 
 
+@pytest.mark.slow
 def test_a_changed_state_is_refused_although_the_hash_is_correct(forged: Forgery):
     file = forged.seed / "recordings" / "test-0000.rrd"
     recorded = recording.read(file)
@@ -23,6 +26,7 @@ def test_a_changed_state_is_refused_although_the_hash_is_correct(forged: Forgery
     ]
 
 
+@pytest.mark.slow
 def test_a_recording_under_another_name_is_refused(forged: Forgery):
     file = forged.seed / "recordings" / "test-0000.rrd"
     recorded = recording.read(file)
@@ -35,6 +39,7 @@ def test_a_recording_under_another_name_is_refused(forged: Forgery):
     assert "test-0900.rrd belongs to no row of the splits" in forged.checked().problems[0]
 
 
+@pytest.mark.slow
 def test_another_cause_is_refused_and_an_old_recording_without_one_is_not(forged: Forgery):
     file = forged.seed / "recordings" / "test-0000.rrd"
     recorded = recording.read(file)

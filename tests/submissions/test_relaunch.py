@@ -11,6 +11,7 @@ from dextron_bench.submissions.entry import MANIFEST_KINDS
 from tests.helpers.forged_bundles import Forgery
 
 
+@pytest.mark.slow
 def test_an_agent_that_did_not_play_these_episodes_is_refused(forged: Forgery):
     """The bundle has episodes of one agent and the code of another."""
     code = forged.folder / "agent" / "near.py"
@@ -35,6 +36,7 @@ class Near:
 """
 
 
+@pytest.mark.slow
 def test_an_agent_that_runs_again_cannot_find_its_episodes(forged: Forgery):
     """Its exit code is 70 plus the number of folders of episodes that it finds, unless the guard stops the search."""
     (forged.folder / "agent" / "near.py").write_text(SEARCHER)
@@ -42,11 +44,13 @@ def test_an_agent_that_runs_again_cannot_find_its_episodes(forged: Forgery):
     assert "it ended with code 70" in problems[0] or "agents may not" in problems[0]
 
 
+@pytest.mark.slow
 def test_a_bundle_without_the_agents_file_is_refused(forged: Forgery):
     (forged.folder / "agent" / "near.py").unlink()
     assert "the bundle lacks the agent's file near.py" in forged.checked(rerun=True).problems[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "spec"),
     [
@@ -90,6 +94,7 @@ def test_agents_of_each_kind_start_from_the_bundle(kind: str, spec: str, weights
     assert launch.weights == (f"{tmp_path}/{weights}" if weights else "")
 
 
+@pytest.mark.slow
 def test_weights_outside_the_bundle_are_refused(forged: Forgery):
     forged.json("bundle.json", lambda manifest: manifest["agent"].update(weights="../bundle.json"))
     assert "the bundle lacks the agent's file ../bundle.json" in forged.checked(rerun=True).problems[0]

@@ -16,6 +16,7 @@ from tests.helpers import tiny_benchmark
 from tests.helpers.forged_bundles import Forgery, row
 
 
+@pytest.mark.slow
 def test_an_edited_result_is_refused(forged: Forgery):
     def better(result: dict[str, Any]) -> None:
         result["splits"]["test"]["scores"][2] = 20.0
@@ -62,6 +63,7 @@ def test_other_vector_extensions_make_another_platform():
     assert result_check.same_platform({**here, "machine": []})
 
 
+@pytest.mark.slow
 def test_on_another_platform_only_outcomes_must_agree(forged: Forgery):
     """All episodes differ in the last bits; their outcomes equal the replay."""
     forged.json("seed0/provenance.json", lambda content: content["machine"].update(cpu="another"))
@@ -83,6 +85,7 @@ def foreign(forged: Forgery) -> None:
     forged.table(lambda table: table.assign(trace="0" * 64))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
@@ -97,6 +100,7 @@ def test_another_platform_excuses_no_false_claim(changes: dict[str, Any], why: s
     assert forged.checked().problems == [f"seed0: {why}"]
 
 
+@pytest.mark.slow
 def test_another_platform_excuses_no_false_scores(forged: Forgery):
     foreign(forged)
     forged.json("seed0/result.json", lambda result: result["splits"]["test"]["scores"].reverse())
@@ -114,6 +118,7 @@ def test_mean_returns_agree_on_every_split():
     assert not list(result_check.distant_returns({"splits": splits[0]}, {"splits": splits[0]}))
 
 
+@pytest.mark.slow
 def test_another_platform_excuses_no_forged_recording(forged: Forgery):
     """The table has the hash of the forged recording."""
     foreign(forged)
@@ -129,6 +134,7 @@ def test_another_platform_excuses_no_forged_recording(forged: Forgery):
         assert len(forged.checked().problems) == problems
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [{"machine": "x"}, {"git": ["a"]}, {"machine": {"system": "Linux", "cpu": "\ud800", "cores": 1}}, {"more": 1}],

@@ -39,6 +39,7 @@ def test_without_a_sandbox_the_agent_runs_only_if_it_is_trusted_and_its_tier_sta
     assert "without a sandbox" in trusted.notes[0]
 
 
+@pytest.mark.slow
 def test_a_changed_reward_is_refused(forged: Forgery):
     forged.table(row(2, score=20.0, success=True, cause="solved"))
     forged.conclude()
@@ -54,6 +55,7 @@ def test_a_changed_action_is_refused(forged: Forgery):
     assert "its hash of states, actions and rewards differs" in "".join(forged.checked().problems)
 
 
+@pytest.mark.slow
 def test_invalid_or_missing_actions_are_refused(forged: Forgery):
     forged.table(row(0, actions=np.array([2.0])))
     assert "row 0 has actions that are not" in forged.checked().problems[0]
@@ -102,6 +104,7 @@ def test_a_tier_cannot_be_claimed(forged: Forgery):
     assert "tier" not in verdict.results[0]
 
 
+@pytest.mark.slow
 @needs_sandbox
 def test_another_agents_episodes_are_refused_unless_the_agent_chooses_them(submitted: Path, forged: Forgery):
     """The board has the same episodes under another name."""
@@ -119,6 +122,7 @@ def test_another_agents_episodes_are_refused_unless_the_agent_chooses_them(submi
     assert line in rerun.notes
 
 
+@pytest.mark.slow
 def test_chosen_and_hidden_seeds_are_refused(submitted: Path, tmp_path: Path):
     forged = taken_apart(submitted / "twins.zip", tmp_path)
     forged.json("bundle.json", lambda manifest: manifest.update(seeds=[1]))

@@ -50,6 +50,7 @@ def rolled_out() -> Episode:
     return episode
 
 
+@pytest.mark.slow
 def test_every_step_is_shown_as_it_is_taken():
     recorder, episode = Recorder(), rolled_out()
     assert live.play(ExpertAgent(), SOURCE, ROW, MODEL, recorder, speed=0).states.tobytes() == episode.states.tobytes()

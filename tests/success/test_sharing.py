@@ -48,6 +48,7 @@ def test_a_merge_names_the_blocks_that_are_missing(tmp_path: Path):
         work_in(tmp_path).check_complete()
 
 
+@pytest.mark.slow
 def test_a_piece_of_another_data_set_is_refused(tmp_path: Path):
     generate_share(tmp_path / "a", "0/1")
     other = generation.DatasetConfig("synthetic", seed=1, block=5, policies=("nothing",))

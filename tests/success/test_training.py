@@ -25,6 +25,7 @@ def trained(tmp_path: Path) -> Path:
     return tmp_path / "trained"
 
 
+@pytest.mark.slow
 def test_a_stopped_training_ends_with_the_same_bytes(trained: Path, tmp_path: Path):
     write_block(tmp_path / "stopped", 0, [30] * 10, [0, 1] * 5)
 
@@ -38,6 +39,7 @@ def test_a_stopped_training_ends_with_the_same_bytes(trained: Path, tmp_path: Pa
     assert file_contents(tmp_path / "stopped") == file_contents(trained)
 
 
+@pytest.mark.slow
 def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path, tmp_path: Path):
     write_block(tmp_path / "continued", 0, [30] * 10, [0, 1] * 5)
     train(tmp_path / "continued", replace(SHORT, epochs=1))
@@ -47,6 +49,7 @@ def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path,
         train(tmp_path / "continued", replace(SHORT, epochs=1))
 
 
+@pytest.mark.slow
 def test_the_learning_rate_is_halved_every_hundred_epochs(tmp_path: Path, rates: list[float]):
     """Table II; here every two."""
     assert TrainingConfig() == TrainingConfig(batch=1024, learning_rate=1e-3, halved_every=100)
@@ -74,6 +77,7 @@ def test_other_settings_impossible_settings_and_a_model_as_state_are_refused(tra
         train(trained, SHORT)
 
 
+@pytest.mark.slow
 def test_the_model_is_from_the_epoch_with_the_lowest_held_out_loss(tmp_path: Path):
     """Outcomes are random and episodes are few, so every epoch makes the predictions on held-out episodes worse."""
     rng = np.random.default_rng(1)

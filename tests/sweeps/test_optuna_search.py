@@ -20,6 +20,7 @@ def done(rate: float, score: float, *points: float) -> Trial:
     return Trial(settings, "mine/synthetic", DONE, Estimate(score, score, score), points=curve)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["tpe", "gp"])
 def test_a_proposal_depends_on_the_earlier_trials_and_the_seed_alone(sampler: str):
     earlier = [done(0.1 / (k + 1), 10.0 - k) for k in range(11)]

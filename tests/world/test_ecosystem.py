@@ -117,6 +117,7 @@ def test_a_single_environment_works_in_gymnasiums_wrappers(variant: str, wrapper
     assert all(isinstance(value, str | float | bool) for info in infos for value in leaves(info))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrapper", PICTURED)
 def test_a_single_environment_gives_pictures_to_gymnasiums_wrappers(wrapper: str):
     env = PICTURED[wrapper](gymnasium.make(ID, **VARIANTS["pictured"]))
@@ -139,6 +140,7 @@ def test_gymnasium_records_a_video_of_singles_and_vectors(tmp_path: Path):
     assert list(tmp_path.glob("many/*.mp4"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("mode", MODES)
 def test_a_vector_environment_works_in_every_mode(variant: str, mode: str):

@@ -170,6 +170,7 @@ def test_the_first_reset_begins_an_episode_in_every_slot():
         env.reset(options={"reset_mask": np.array([True, False])})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_the_autoreset_modes_agree_with_gymnasiums(mode: AutoresetMode):
     vector = gymnasium.make_vec(ID, num_envs=3, reaches=SOURCE, autoreset_mode=mode.value)

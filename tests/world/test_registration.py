@@ -17,6 +17,7 @@ def printed(code: str) -> str:
     return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "code",
     [
@@ -30,6 +31,7 @@ def test_make_knows_the_environment(code: str):
     assert printed(f"{code}; print(type(env.unwrapped).__name__, env.spec.id)") == f"{SINGLE} {ID}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "code",
     [

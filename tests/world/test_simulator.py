@@ -31,12 +31,14 @@ def run(code: str, gl: str | None, folder: Path) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gl", [*BROKEN, "wrong", "disabled", None])
 def test_a_world_is_built_and_the_variable_stays(gl: str | None, tmp_path: Path):
     code = "import os; from dextron_bench.world import model; print(model.load().nq, os.environ.get('MUJOCO_GL'))"
     assert run(code + "; assert 'PYOPENGL_PLATFORM' not in os.environ", gl, tmp_path) == f"25 {gl}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gl", [*BROKEN, "wrong", None])
 def test_the_dm_control_environment_steps(gl: str | None, tmp_path: Path):
     pytest.importorskip("dm_control")
@@ -46,6 +48,7 @@ def test_the_dm_control_environment_steps(gl: str | None, tmp_path: Path):
     assert run(code, gl, tmp_path) == "0.0"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gl", [*BROKEN, "wrong"])
 def test_a_picture_says_what_is_missing(gl: str, tmp_path: Path):
     code = """

@@ -50,6 +50,7 @@ def token(ask: Ask) -> str:
     return match[1]
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_episodes_that_match(ask: Ask, episodes: pd.DataFrame):
     answer, body = ask("/?" + urlencode({"where": "cause == 'solved' and return == 20", "order": "best first"}))
     text = body.decode()

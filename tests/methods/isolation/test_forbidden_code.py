@@ -63,6 +63,7 @@ def test_failing_or_forbidden_code_fails_its_episodes_and_is_named(
         assert episode.failure.endswith(" at step 0")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
 @pytest.mark.parametrize(
     "attempt",
@@ -118,6 +119,7 @@ def test_memory_that_is_shared_ends_the_agent(act: str, why: str, agent_spec: Ca
     assert why in episode.failure
 
 
+@pytest.mark.slow
 def test_without_a_sandbox_the_size_of_files_is_measured(
     agent_spec: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
 ):

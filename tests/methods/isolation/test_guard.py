@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import dextron_bench
 from dextron_bench.methods.isolation.guard import PUBLIC
 
@@ -28,6 +30,7 @@ def test_public_modules_import_only_public_modules():
     assert set(imported) - {"dextron_bench.world.registration"} == PUBLIC  # Every import registers.
 
 
+@pytest.mark.slow
 def test_public_names_that_were_used_before_are_hidden_too():
     code = """
 import dextron_bench

@@ -18,6 +18,7 @@ from tests.helpers.isolated_play import CASES, CLOSES, play
 from tests.helpers.short_reaches import SOURCE
 
 
+@pytest.mark.slow
 def test_an_isolated_agent_acts_as_in_this_process(agent_spec: Callable[[str], str]):
     class Here:
         def reset(self, episodes: np.ndarray) -> None: ...

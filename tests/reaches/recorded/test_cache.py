@@ -99,6 +99,7 @@ def test_a_failed_write_does_not_change_the_cache(
     assert os.listdir(recorded_cache.cache_folder()) == [recorded_cache.CACHE_FILE]
 
 
+@pytest.mark.slow
 def test_the_authors_release_is_imported_completely(release: Path):
     imported = recorded_cache.import_release(release)
     assert len(imported) == 575

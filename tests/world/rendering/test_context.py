@@ -74,12 +74,14 @@ def printed(code: str, **environment: str) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 def test_a_process_forked_from_one_that_has_drawn_refuses_to_draw():
     lines = printed(FORK).splitlines()
     assert len(lines) == 2
     assert all("forked from one that has drawn" in line and "'spawn' or 'forkserver'" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_a_process_forked_before_the_first_picture_draws():
     assert printed(FORK_FIRST) == "0"
 
@@ -89,6 +91,7 @@ def test_pictures_are_the_same_in_every_thread():
     assert printed(THREADS) == "4 True"
 
 
+@pytest.mark.slow
 def test_two_renderers_draw_in_turn_and_the_end_of_the_process_frees_them():
     assert printed(TURNS) == "True (64, 96, 3)"
 
