@@ -15,6 +15,7 @@ import pytest
 import rerun as rr
 
 from dextron_bench import recording
+from dextron_bench.processes import limited_process
 from dextron_bench.recording import reader_process
 from dextron_bench.recording.summaries import NEEDED
 from tests.helpers import many_processors
@@ -131,13 +132,13 @@ def test_a_file_that_aborts_its_reader_is_reported_and_the_other_files_are_read(
 
 
 def test_one_process_screens_several_files(whole: Path, monkeypatch: pytest.MonkeyPatch):
-    commands, run = [], subprocess.run
+    commands, run = [], limited_process.run
 
-    def counted(command: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
+    def counted(*command: Any) -> limited_process.Outcome:
         commands.append(command)
-        return run(command, **options)
+        return run(*command)
 
-    monkeypatch.setattr(subprocess, "run", counted)
+    monkeypatch.setattr(limited_process, "run", counted)
     cut = whole.with_name("cut.rrd")
     cut.write_bytes(whole.read_bytes()[:999])
     first, second, third = recording.screen([whole, cut, whole])
