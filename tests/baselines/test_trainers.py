@@ -76,7 +76,7 @@ def test_a_restored_trainer_continues_bit_for_bit(kind: str, cache: Path):
         np.testing.assert_array_equal(array, restored[name], err_msg=name)
 
 
-@pytest.mark.parametrize("kind", ["rl", "held", "rlil"])
+@pytest.mark.parametrize("kind", ["rlil", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("rl", "held"))])
 def test_a_short_training_equals_the_first_epochs_of_a_long_one(kind: str, cache: Path):
     short, long = (trainer(kind, cache, schedule=Schedule(epochs, 30, 1)) for epochs in (2, 7))
     for _ in range(2):

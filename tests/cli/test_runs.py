@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 
 from dextron_bench.cli import main
+from tests.helpers import tiny_benchmark
 
 AGENT = """
 from dataclasses import dataclass
@@ -29,19 +31,27 @@ class Mine:
 """
 
 
-@pytest.fixture
-def here(tiny_world: Path, capsys: pytest.CaptureFixture[str]) -> Path:
-    """A folder with runs of EXP, of an agent with two settings, and of an agent that failed, in the tiny world."""
-    (tiny_world / "mine.py").write_text(AGENT.format(name="mine", broken=False))
-    (tiny_world / "broken.py").write_text(AGENT.format(name="broken", broken=True))
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Runs of EXP, of an agent with two settings, and of an agent that failed, in the tiny world."""
     common = ["--split", "test", "--quiet", "--record", "0"]
-    for words, code in (
-        (["exp"], 0),
-        (["mine.py:Mine"], 0),
-        (["mine.py:Mine", "--near", "0.2"], 0),
-        (["broken.py:Mine"], 2),
-    ):
-        assert main.main(["run", "--method", *words, *common]) == code
+    with tiny_benchmark.working_folder(tmp_path_factory.mktemp("listed")) as folder:
+        (folder / "mine.py").write_text(AGENT.format(name="mine", broken=False))
+        (folder / "broken.py").write_text(AGENT.format(name="broken", broken=True))
+        for words, code in (
+            (["exp"], 0),
+            (["mine.py:Mine"], 0),
+            (["mine.py:Mine", "--near", "0.2"], 0),
+            (["broken.py:Mine"], 2),
+        ):
+            assert main.main(["run", "--method", *words, *common]) == code
+    return folder
+
+
+@pytest.fixture
+def here(tiny_world: Path, played: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    """A folder with a copy of these runs and agents."""
+    shutil.copytree(played, tiny_world, dirs_exist_ok=True)
     capsys.readouterr()
     return tiny_world
 

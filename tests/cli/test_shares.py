@@ -87,6 +87,7 @@ def test_the_bytes_are_the_same_for_any_number_of_shares(
         assert sorted(json.loads((merged / method / "synthetic/seed0/recordings.json").read_text())) == recordings
 
 
+@pytest.mark.slow
 def test_a_merge_plays_nothing_and_may_be_repeated(here: Path, monkeypatch: pytest.MonkeyPatch):
     play_shares(RUN, 2, here / "runs")
     monkeypatch.setattr(execution, "rollout", forbidden)

@@ -58,6 +58,7 @@ def content(runs: str = "runs") -> dict[str, Any]:
     return json.loads(file.read_text())
 
 
+@pytest.mark.slow
 def test_the_best_of_a_grid_is_chosen_on_val_alone(here: Path, capsys: pytest.CaptureFixture[str]):
     words = sweep("--grid", f"near=0.95,{SOLVES},-1,2", "--seed", "0", "1", "--name", "nearness")
     assert main.main(words) == 3  # Some trials failed.

@@ -33,6 +33,7 @@ def test_an_error_is_one_line(tiny_world: Path, complaint: Callable[..., str]):
     assert "No such file" in complaint("windows", "nix.safetensors")
 
 
+@pytest.mark.slow
 def test_only_failures_are_shown_if_wanted(
     tiny_world: Path, capsys: pytest.CaptureFixture[str], complaint: Callable[..., str]
 ):

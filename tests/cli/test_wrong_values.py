@@ -187,10 +187,13 @@ def ends_so_alone(words: Sequence[str]) -> bool:
 
 ALL = list(commands())
 EVERY = pytest.mark.parametrize(("command", "cls"), ALL, ids=["-".join(words) for words, _ in ALL])
+QUICK = {("view",), ("compare",), ("runs", "export"), ("recordings", "list"), ("leaderboard", "serve")}
+SOME = [
+    pytest.param(words, cls, id="-".join(words), marks=() if words in QUICK else pytest.mark.slow) for words, cls in ALL
+]
 
 
-@pytest.mark.slow
-@EVERY
+@pytest.mark.parametrize(("command", "cls"), SOME)
 def test_a_wrong_value_is_never_an_unexpected_error(
     command: tuple[str, ...], cls: Any, folder: Path, capsys: pytest.CaptureFixture[str]
 ):

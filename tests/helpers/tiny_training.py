@@ -32,6 +32,10 @@ SEEDS = (0, 3)
 TIMES = {"timing.jsonl", "provenance.json", "times.json"}  # Files that depend on time and machine.
 
 
+class Killed(BaseException):
+    """Stands for the end of the process."""
+
+
 def write(folder: Path) -> Path:
     """Writes the catalogue and the tables of the splits of two sources into a folder; returns the folder."""
     tiny_benchmark.write(folder, pd.concat([tiny_benchmark.ROWS, TRAIN]))

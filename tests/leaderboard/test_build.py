@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,20 +17,29 @@ from dextron_bench.leaderboard import collect
 from dextron_bench.methods import weights
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
+from tests.helpers import tiny_training
 
 TOY = "tests.helpers.toy_learner:Toy"
 FRESH = {"beacon": "b", "submission": "s", "splits": {}}
 QUIET = ("--quiet", "--record", "0")
 
 
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with runs of the toy learner (two seeds) and of `nothing` on the tiny benchmark."""
+    with tiny_training.working_folder(tmp_path_factory.mktemp("built")) as folder:
+        assert main.main(["run", "--method", TOY, "--preset", "quick", "--seed", "0", "1", *QUIET]) == 0
+        assert main.main(["run", "--method", "nothing", *QUIET]) == 0
+    return folder
+
+
 @pytest.fixture
-def here(training_world: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder on the tiny benchmark, with runs of the toy learner (two seeds) and of `nothing`."""
+def here(training_world: Path, played: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with a copy of these runs, and a folder for the weights that ship."""
     monkeypatch.setattr(
         weights, "shipped_folder", lambda learner, reaches: training_world / "shipped" / learner.label / reaches
     )
-    assert main.main(["run", "--method", TOY, "--preset", "quick", "--seed", "0", "1", *QUIET]) == 0
-    assert main.main(["run", "--method", "nothing", *QUIET]) == 0
+    shutil.copytree(played, training_world, dirs_exist_ok=True)
     return training_world
 
 
