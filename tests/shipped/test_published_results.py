@@ -23,7 +23,6 @@ BOARD = Path(__file__).parents[2] / "leaderboard"
 RESULTS = sorted((BOARD / "results").glob("*/*/seed*/result.json"))
 QUICK = ("bc/real/seed0", "rlil-0.1/synthetic/seed0", "stopping/real/seed0")  # Replayed without the slow tests, too.
 WEIGHTS = sorted((Path(baselines.__file__).parent / "weights").glob("*/*/seed*.safetensors"))
-QUICK = ("bc/real/seed0", "rlil-0.1/synthetic/seed0", "stopping/real/seed0")  # Replayed without the slow tests, too.
 
 
 def name(file: Path) -> str:
