@@ -57,7 +57,6 @@ def test_the_expert_of_a_setting_is_drawn_among_those_that_solve_it():
     assert counts.min() > 30
 
 
-@pytest.mark.slow
 def test_equal_seeds_draw_equal_settings_and_other_seeds_do_not():
     pd.testing.assert_frame_equal(solved(7, 20), solved(7).head(20))
     assert not set(solved(8)["offset_x"]) & set(solved(7)["offset_x"])
