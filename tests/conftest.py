@@ -34,8 +34,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--thorough",
         action="store_true",
-        help="slow tests with many more mutations and kills, and with real fresh settings",
+        help="slow tests with many more mutations and kills, and those that run every week only",
     )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Tests marked `thorough` are slow ones, and are left out without `--thorough`."""
+    chosen, left = [], []
+    for item in items:
+        is_thorough = item.get_closest_marker("thorough")
+        if is_thorough:
+            item.add_marker("slow")
+        (left if is_thorough and not config.getoption("--thorough") else chosen).append(item)
+    config.hook.pytest_deselected(items=left)
+    items[:] = chosen
 
 
 @pytest.hookimpl(wrapper=True)

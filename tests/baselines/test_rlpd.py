@@ -140,7 +140,7 @@ def test_labels_name_the_settings_that_differ_and_impossible_ones_are_refused():
             Rlpd(**settings)  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_it_solves_a_bandit_with_a_known_best_action():
     """Episodes of one step with reward 5 a s for action a in state s = -1 or 1: the best action is s."""
     ensemble, rng = learner(0, 1), np.random.default_rng(0)

@@ -79,7 +79,7 @@ def test_a_run_that_is_killed_repeatedly_ends_like_an_uninterrupted_one(
     assert start("whole").wait(timeout=300) == 0
     whole = tiny_training.contents(here / "whole")
     kills, rng = 0, random.Random(0)
-    while kills < (100 if thorough else 3):
+    while kills < (100 if thorough else 2):
         before, process = files(), start("broken")
         while process.poll() is None and files() <= before:
             time.sleep(0.01)

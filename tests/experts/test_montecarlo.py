@@ -239,13 +239,13 @@ import sys
 from pathlib import Path
 from tests.experts.test_montecarlo import search
 folder = Path(sys.argv[1])
-search(folder, rows=3).to_parquet(folder / "draws.parquet")
+search(folder, rows=2).to_parquet(folder / "draws.parquet")
 """
 
 
 @pytest.mark.slow
 def test_a_killed_search_continues_to_the_same_rows(tmp_path):
-    """It is killed before its first block, and then with one block and with two."""
+    """It is killed before its first block, and then with two blocks."""
 
     def start(folder: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen([sys.executable, "-c", WHOLE, str(folder)], cwd=Path(__file__).parents[2])
@@ -255,8 +255,8 @@ def test_a_killed_search_continues_to_the_same_rows(tmp_path):
 
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     assert start(whole).wait() == 0
-    assert count(whole) >= 4
-    for blocks_before in (0, 1, 2):
+    assert count(whole) >= 3
+    for blocks_before in (0, 2):
         process = start(killed)
         while count(killed) < blocks_before or not killed.exists():
             assert process.poll() is None

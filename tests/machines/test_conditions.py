@@ -1,6 +1,7 @@
 """The commands of a first hour under the conditions of other machines: each must end with code 0, or say what is wrong.
 
-Conditions that need another system are tried by `.ci/machines`.
+Three conditions take three minutes; the others are tried with `--thorough`, and those that need another
+system by `.ci/machines`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from tests.helpers import conditions, many_processors, tiny_training
 from tests.helpers.tiny_benchmark import COMMAND
 
 pytestmark = pytest.mark.slow
-ALIKE = "it resembles another condition, and is tried with --thorough"
+thorough = pytest.mark.thorough
 
 TOY = tiny_training.TOY
 RECORDING = "runs/reflex/synthetic/seed0/recordings/val-0000.rrd"
@@ -54,28 +55,29 @@ def all_work(folder: Path, environment: dict[str, str], redirection: str = "") -
 
 @pytest.mark.parametrize(
     "names",
-    ["no_flock,no_folder_fsync,no_name,process_one", "no_fcntl,no_fsync,no_links,no_exclusive,no_modes,no_mmap"],
+    [
+        "no_flock,no_folder_fsync,no_name,process_one",
+        pytest.param("no_fcntl,no_fsync,no_links,no_exclusive,no_modes,no_mmap", marks=thorough),
+    ],
 )
 def test_file_systems_and_users(names: str, tmp_path: Path):
     all_work(tmp_path, conditions.environment(*names.split(",")) | {"TMPDIR": str(tmp_path)})
 
 
+@thorough
 @pytest.mark.parametrize("redirection", ["<&- 2>&-", ">&-"])
 def test_streams_that_are_closed(redirection: str, tmp_path: Path):
     all_work(tmp_path, dict(os.environ), redirection)
 
 
-@pytest.mark.parametrize("count", [64, 128])
-def test_many_processors(count: int, tmp_path: Path, thorough: bool):
-    if count < 128 and not thorough:
-        pytest.skip(ALIKE)
+@pytest.mark.parametrize("count", [pytest.param(64, marks=thorough), 128])
+def test_many_processors(count: int, tmp_path: Path):
     all_work(tmp_path, many_processors.environment(tmp_path, count))
 
 
+@thorough
 @pytest.mark.parametrize("charset", ["ASCII", "ISO-8859-1"])
-def test_a_locale_without_utf8(charset: str, tmp_path: Path, thorough: bool):
-    if charset == "ASCII" and not thorough:
-        pytest.skip(ALIKE)
+def test_a_locale_without_utf8(charset: str, tmp_path: Path):
     variables = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     if charset != "ASCII":
         made = subprocess.run(["localedef", "-i", "en_US", "-f", charset, tmp_path / "en_US"], capture_output=True)

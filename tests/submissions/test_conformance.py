@@ -49,6 +49,7 @@ def test_the_template_passes_the_checks_and_its_own_test(tmp_path: Path, capsys:
     assert "exists already; name a new folder" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_random_numbers_without_the_seed_are_a_fault(tmp_path: Path):
     results = check(tmp_path, "return self.rng.uniform(-1, 1, (len(states), 1))")
     assert results["it is deterministic under a seed"].verdict == MEND
@@ -72,6 +73,7 @@ def test_a_failure_ends_the_checks(tmp_path: Path):
     assert "nothing_of_that_name" in only.detail
 
 
+@pytest.mark.slow
 def test_an_agent_for_few_episodes_at_once_has_a_fault(tmp_path: Path):
     results = check(tmp_path, "return np.zeros((min(len(states), 9), 1))")
     assert results["it is fast enough"].verdict == MEND

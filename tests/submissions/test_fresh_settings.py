@@ -209,7 +209,7 @@ AGENTS = {  # By name: class, settings, and whether the row is marked.
 }
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @needs_sandbox
 def test_a_memory_of_the_splits_is_marked_and_an_honest_rule_is_not(here: Path, thorough: bool):
     for name in list(AGENTS)[: 3 if thorough else 2]:

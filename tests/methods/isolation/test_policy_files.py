@@ -55,6 +55,7 @@ def test_torchscript_policies_play_and_pickles_do_not(tmp_path: Path):
         policy_files.load(tmp_path / "policy.pkl")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sandbox.is_available(), reason="bubblewrap is not installed")
 def test_torchscript_that_writes_files_writes_none_in_the_sandbox(writer: Path):
     (episode,) = play(str(writer), CASES[:1])
