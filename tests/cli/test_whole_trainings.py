@@ -54,7 +54,7 @@ def test_all_makes_the_papers_table(here: Path, capsys: pytest.CaptureFixture[st
     ("words", "latest"),
     [
         (["--method", TOY, "--wait", "0.2"], 0.3),
-        (["--method", "rlil", "--preset", "smoke"], 1.0),
+        pytest.param(["--method", "rlil", "--preset", "smoke"], 1.0, marks=pytest.mark.thorough),
     ],
     ids=["toy", "rlil"],
 )

@@ -129,6 +129,7 @@ def test_inputs_that_fill_the_object_store_are_kept_on_disk(here: Path, monkeypa
     assert [(here / f"sizes/{number}").read_text() for number in range(4)] == ["40000000"] * 4
 
 
+@pytest.mark.thorough
 def test_an_agent_that_crashes_its_process_is_not_tried_again(
     here: Path, monkeypatch: pytest.MonkeyPatch, complaint: Callable[..., str]
 ):

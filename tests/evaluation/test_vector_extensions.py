@@ -61,7 +61,7 @@ def test_numpys_vector_instructions_change_no_bit():
     assert all(length > 50 for episodes in usual["played"].values() for _, length in episodes)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the name of this kernel is one of x86")
 def test_the_kernels_of_openblas_and_pytorch_change_no_bit():
     oldest = played(

@@ -168,7 +168,7 @@ def test_a_search_stops_at_the_first_block_that_reaches_the_rows():
     assert blocks.total(done) == Tally(4, 32, 17, 15)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_search_continues_from_the_kept_rows_of_a_database(tmp_path):
     def kept(draws: pd.DataFrame) -> pd.DataFrame:
         return draws[draws["score"] > blocks.KEPT].astype({"length": int}).reset_index(drop=True)

@@ -1,6 +1,6 @@
 """The commands of a first hour under the conditions of other machines: each must end with code 0, or say what is wrong.
 
-Three conditions take three minutes; the others are tried with `--thorough`, and those that need another
+Two conditions take two minutes; the others are tried with `--thorough`, and those that need another
 system by `.ci/machines`.
 """
 
@@ -70,7 +70,8 @@ def test_streams_that_are_closed(redirection: str, tmp_path: Path):
     all_work(tmp_path, dict(os.environ), redirection)
 
 
-@pytest.mark.parametrize("count", [pytest.param(64, marks=thorough), 128])
+@thorough
+@pytest.mark.parametrize("count", [64, 128])
 def test_many_processors(count: int, tmp_path: Path):
     all_work(tmp_path, many_processors.environment(tmp_path, count))
 

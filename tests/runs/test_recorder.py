@@ -124,7 +124,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.thorough)])
 def test_processes_end_silently_with_the_one_that_started_them(tmp_path: Path, sent: signal.Signals):
     """Ctrl-C goes to all processes of a terminal; the only traceback is of the first one, whose command catches it."""
     (tmp_path / "program.py").write_text(PROGRAM.format(root=str(Path(__file__).parents[2])))

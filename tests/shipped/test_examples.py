@@ -90,7 +90,7 @@ def test_the_loss_leaves_out_the_padding_of_a_chunk():
     assert policy(batch).item() == 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_lerobot_style_policy_ends_as_a_bundle(training_world: Path, capsys: pytest.CaptureFixture[str]):
     """In the tiny world, after 20 updates."""
     board = example("lerobot_to_board")
