@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from dextron_bench.experts import openings
 from dextron_bench.experts.openings import FAILS, NO_DECISION, SUCCEEDS, Openings
 from dextron_bench.experts.policies import Case, Expert
 from dextron_bench.world import task
-from dextron_bench.world.engine import Engine
+from dextron_bench.world.engine import Engine, Step
 from tests.helpers.short_reaches import SETTINGS, SOURCE
 
 CASES = [Case(setting, Expert(1.2, 0.3), 0.1) for setting in SETTINGS]
@@ -58,6 +60,37 @@ def test_decisions_begin_near_the_bottle_and_come_every_second_step(played: Open
         distances = task.distance(played.states[rows].astype(float))
         assert steps[0] == np.argmax(distances < openings.NEAR)
         assert set(np.diff(steps)) == {openings.EVERY}
+
+
+class Walks:
+    """An engine of one slot whose hand walks through given distances; its states are numbers."""
+
+    def __init__(self, distances: list[float]) -> None:
+        self._left = iter(distances)
+
+    def begin(self, slots: np.ndarray, *_: object) -> np.ndarray:
+        """The first state."""
+        return np.array([[next(self._left)]])
+
+    def save(self, slots: np.ndarray) -> dict[str, np.ndarray]:
+        """Nothing of an engine's state but its slots."""
+        return {"slot": slots}
+
+    def step(self, slots: np.ndarray, actions: np.ndarray) -> Step:
+        """The next state; the episode ends when no distance is left."""
+        distance = next(self._left, None)
+        ended = np.array([distance is None])
+        return Step(np.array([[distance or 0.0]]), np.zeros(1), ended, ended, ended)
+
+
+def test_decisions_are_counted_from_the_first_step_near_the_bottle(monkeypatch: pytest.MonkeyPatch):
+    """It is near from step 1 on, leaves, and is near again: decisions are at the steps 1, 3, 5, and not at 6."""
+    monkeypatch.setattr(task, "distance", lambda states: states[:, 0])
+    monkeypatch.setattr(openings, "_try", lambda engine, begin, episode, starts: np.full(len(episode), FAILS))
+    near, far = openings.NEAR / 2, openings.NEAR * 2
+    walk: Any = Walks([far, near, near, far, near, near, near])
+    [(_, outcomes)] = openings._play_together(walk, [SOURCE.path(SETTINGS[0])], [])
+    assert np.flatnonzero(outcomes != NO_DECISION).tolist() == [1, 3, 5]
 
 
 def test_decisions_between_a_success_and_a_failure_are_tried_and_others_taken_to_be_equal(

@@ -7,7 +7,7 @@ import pytest
 from dextron_bench.reaches.reach import Trajectory
 from dextron_bench.splits import hard
 from dextron_bench.splits.near_equal import SETTING, without_near_equal
-from dextron_bench.splits.scanning import Scanner
+from dextron_bench.splits.scanning import Scanner, grid
 from tests.helpers.short_reaches import SOURCE
 
 NAMES = SOURCE.names
@@ -46,6 +46,21 @@ def test_windows_are_narrow_and_the_expert_is_in_their_middle(rows):
     assert rows["window"].between(0.89 / 64, 0.08).all()
     np.testing.assert_allclose(rows["window"], 2.5 * rows["offset_x"].abs(), atol=0.89 / 64)
     np.testing.assert_allclose(rows["critical"], 0.3, atol=0.89 / 64)
+
+
+def test_a_setting_that_only_the_coarse_scan_solves_has_no_window_and_is_left_out():
+    """A point of 16 lies between two points of 64. Here it alone is solved if offset_y is below -0.005."""
+    point = grid(16)[3]
+
+    class Slit(MadeUp):
+        def play(self, rows: pd.DataFrame, criticals: np.ndarray) -> np.ndarray:
+            slit = (rows["offset_y"] < -0.005).to_numpy()[:, None] & (rows["gain"] != hard.FULL_SPEED).all()
+            return np.where(slit, 20.0 * (np.abs(criticals - point) < 1e-6), super().play(rows, criticals))
+
+    scanner = Slit(SOURCE, None)  # type: ignore[arg-type]
+    drawn = hard.HardSettings(scanner, TRAIN, TRAIN.head(0), 0.065, coarse=16, fine=64).draw(COUNT, seed=0)
+    assert (drawn["window"] > 0.0).all()
+    assert (drawn["offset_y"] >= -0.005).all()
 
 
 def test_rows_lie_near_settings_of_train_that_the_rule_fails(rows):

@@ -47,6 +47,15 @@ def test_equal_arrays_and_metadata_give_equal_bytes(tmp_path: Path):
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
+def test_an_array_with_more_bytes_than_its_shape_needs_is_damaged(tmp_path: Path):
+    """One number of 8 bytes, and an entry that says 16."""
+    header = json.dumps({"a": {"dtype": "F64", "shape": [1], "data_offsets": [0, 16]}}).encode()
+    file = tmp_path / "a.safetensors"
+    file.write_bytes(len(header).to_bytes(8, "little") + header + bytes(16))
+    with pytest.raises(tensors.BadTensors, match=r"an array of shape \(1,\) has 16 bytes"):
+        tensors.memory_mapped(file)
+
+
 @pytest.mark.parametrize(
     "content", [b"", b"12345678", (2**60).to_bytes(8, "little") + b"{", (5).to_bytes(8, "little") + b'{"a":']
 )

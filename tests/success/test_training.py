@@ -51,7 +51,6 @@ def test_a_training_with_fewer_epochs_continues_to_the_same_bytes(trained: Path,
         train(tmp_path / "continued", replace(SHORT, epochs=1))
 
 
-@pytest.mark.slow
 def test_the_learning_rate_is_halved_every_hundred_epochs(tmp_path: Path, rates: list[float]):
     """Table II; here every two."""
     assert TrainingConfig() == TrainingConfig(batch=1024, learning_rate=1e-3, halved_every=100)
