@@ -16,6 +16,7 @@ from dextron_bench.methods.settings import Settings
 from dextron_bench.runs import annotations, playing, result_files
 from dextron_bench.splits.names import VAL
 from dextron_bench.storage import records, run_times
+from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.run_folder import RunFolder, run_folders
 from dextron_bench.storage.run_times import RunTimes
 from dextron_bench.training import jobs, learning_curve
@@ -73,14 +74,25 @@ class CataloguedRun:
         return float("nan")
 
 
-def entries(runs: Path) -> list[CataloguedRun]:
-    """The entries of a folder of runs, in the order of their names; raises DamagedFile."""
+def entries(runs: Path, unreadable: list[str] | None = None) -> list[CataloguedRun]:
+    """The entries of a folder of runs, in the order of their names.
+
+    `unreadable` receives a line for each entry whose files cannot be read; without it they raise DamagedFile.
+    """
     groups: dict[Path, list[RunFolder]] = defaultdict(list)
     for run in run_folders(runs):
         if run.config.exists():
             groups[run.path.parent].append(run)
     left = {(training.label, training.reaches): training for training in jobs.unfinished(runs)}
-    return [_entry(folder, sorted(members, key=lambda run: run.seed), left) for folder, members in groups.items()]
+    known = []
+    for folder, members in groups.items():
+        try:
+            known.append(_entry(folder, sorted(members, key=lambda run: run.seed), left))
+        except (DamagedFile, OSError) as error:
+            if unreadable is None:
+                raise
+            unreadable.append(f"{'/'.join(folder.parts[-2:])} is left out: {error}")
+    return known
 
 
 def find(all_entries: Iterable[CataloguedRun], name: str) -> CataloguedRun:

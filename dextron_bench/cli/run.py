@@ -146,11 +146,15 @@ class Run:
         if not names or job is None:
             return nullcontext()
         from dextron_bench.tracking import launch
+        from dextron_bench.training.checkpoints import Checkpoints
 
         seeds = [run.seed for run in group]
+        folders = job.training_folders(seeds)
+        if any(Checkpoints(folder, ()).is_locked for folder in folders):
+            return nullcontext()  # The process that trains there has its trackers; this one says that it is there.
         is_over = all(job.run_folder(seed).weights.exists() for seed in seeds)
         grace = launch.PATIENCE if is_over else launch.GRACE
-        return launch.following(job.training_folders(seeds), names, print_warning, grace)
+        return launch.following(folders, names, print_warning, grace)
 
     def _estimate(self, groups: list[list[plans.Run]]) -> int:
         from dextron_bench.runs.estimates import estimate

@@ -11,6 +11,7 @@ import pytest
 from dextron_bench.catalogue import exported_runs, run_catalogue
 from dextron_bench.catalogue.exported_runs import ExportedRun
 from dextron_bench.runs import annotations, playing
+from dextron_bench.storage.atomic import DamagedFile
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.training.checkpoints import Checkpoints
 from tests.catalogue.test_run_catalogue import write_run
@@ -100,6 +101,16 @@ def test_a_seed_has_its_own_scores_if_an_earlier_seed_has_none(runs: Path):
     exported, _ = collect(runs)
     assert metrics(exported["mine/real/seed0"]) == []
     assert metrics(exported["mine/real/seed1"])[0] == ("test.return", 10.0, 0)
+
+
+def test_a_run_with_a_damaged_config_is_left_out_by_name(runs: Path):
+    (runs / "mine/real/seed0/config.json").write_text("{")
+    with pytest.raises(DamagedFile, match=r"config\.json"):
+        run_catalogue.entries(runs)
+    unreadable: list[str] = []
+    assert [entry.name for entry in run_catalogue.entries(runs, unreadable)] == ["learner/real"]
+    [line] = unreadable
+    assert line.startswith("mine/real is left out: ")
 
 
 def test_a_damaged_run_is_left_out_by_name_and_the_others_are_exported(runs: Path):

@@ -13,7 +13,7 @@ from tests.helpers import tiny_benchmark
 
 
 def test_stored_episodes_are_not_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """The tiny benchmark has two rows of `test` and one of `unseen-reach`; those of `test` are stored."""
+    """The tiny benchmark has two rows of `test`, which are stored, and one of `unseen-reach`."""
     monkeypatch.setattr(estimates, "seconds_per_episode", lambda reaches, threads: 0.5)
     with tiny_benchmark.working_folder(tmp_path):
         run = resolve(Plan("exp", "synthetic"))

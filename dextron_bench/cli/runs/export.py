@@ -32,9 +32,11 @@ class Export:
     def __call__(self) -> int:
         from dextron_bench.catalogue import exported_runs, mlflow_export, run_catalogue
 
-        entries = run_catalogue.entries(self.runs)
+        left_out: list[str] = []
+        entries = run_catalogue.entries(self.runs, left_out)
         chosen = [run_catalogue.find(entries, name) for name in self.run] if self.run else entries
-        exported, left_out = exported_runs.collect(chosen)
+        exported, of_seeds = exported_runs.collect(chosen)
+        left_out += of_seeds
         mlflow_export.write(exported, self.into)
         print(f"{len(exported)} runs in {self.into / mlflow_export.DATABASE}")
         for line in left_out:
