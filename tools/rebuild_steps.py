@@ -165,12 +165,6 @@ STEPS: tuple[Step, ...] = (
         makes=tuple(f"docs/pictures/{name}.png" for name in ("fig*", "h*", "windows-real", "failures-real")),
     ),
     Step(
-        "fresh",
-        ("leaderboard fresh --rows 100",),
-        needs=(SPLITS, f"{WEIGHTS}/*/*/*.safetensors"),
-        makes=("leaderboard/fresh/*",),
-    ),
-    Step(
         "tracks",
         (f"leaderboard tracks --method {' '.join(UNDER_TRACKS)}",),
         needs=(SPLITS, f"{DATA}/bottles-*", *(f"{WEIGHTS}/{label}/*/*.safetensors" for label in UNDER_TRACKS)),

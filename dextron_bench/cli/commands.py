@@ -11,7 +11,7 @@ from dextron_bench.cli import eval as evaluation
 from dextron_bench.cli.compare import compare, plan
 from dextron_bench.cli.data import agreement, info, likeness, mc, recorded, splits
 from dextron_bench.cli.data import export as data_export
-from dextron_bench.cli.leaderboard import add, build, fresh, serve, show, tracks, verify
+from dextron_bench.cli.leaderboard import add, announce, build, round, serve, show, tracks, verify
 from dextron_bench.cli.recordings import choose
 from dextron_bench.cli.recordings import export as recordings_export
 from dextron_bench.cli.recordings import list as recordings_list
@@ -60,14 +60,15 @@ RUNS = Group(
 )
 LEADERBOARD = Group(
     "Leaderboards: show the results of a folder of runs; build, serve and verify the published leaderboard; "
-    "add a submission to it; play fresh settings and tracks.",
+    "add a submission to it; play rounds and tracks.",
     {
         "show": show.Show,
         "build": build.Build,
         "serve": serve.Serve,
         "verify": verify.Verify,
         "add": add.Add,
-        "fresh": fresh.Fresh,
+        "announce": announce.Announce,
+        "round": round.Round,
         "tracks": tracks.Tracks,
     },
 )
@@ -129,6 +130,7 @@ MOVED = {  # By old name: the new one.
     "plan": "`compare plan`",
     "cross-validate": "`sweep cross-validate`",
     "mc": "`data mc`",
+    "leaderboard fresh": "`leaderboard round`, for all rows together",
     "splits": "`data splits`",
     "data fit": "`python -m tools.fit_synthetic`, in a checkout",
     "rebuild": "`make rebuild`, in a checkout",

@@ -23,6 +23,8 @@ class Declaration:
     """Hours of training."""
     hardware: str = ""
     """Hardware of the training."""
+    rule: bool = False
+    """The agent was not trained, and acts the same with every seed."""
     privileged: bool = False
     """The agent uses more than the 48 numbers of the state."""
     authors: str = ""

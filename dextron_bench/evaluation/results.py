@@ -10,7 +10,6 @@ from msgspec import UNSET, Meta, UnsetType, field
 from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.evaluation.episodes import action_hashes
 from dextron_bench.methods.settings import Settings
-from dextron_bench.splits.fresh_settings import FreshScores
 from dextron_bench.storage.provenance import Provenance
 from dextron_bench.storage.records import Amount, Count, Number, Record, Scores
 
@@ -95,7 +94,6 @@ class Result(Record, frozen=True):
     tier: str = ""
     privileged: str | None = None
     declared: Declaration | None = None
-    fresh: FreshScores | None = None
     training: Training | None = None
     maker: Maker | None = None
     replay: Replay | None = None

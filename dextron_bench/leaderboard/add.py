@@ -11,7 +11,7 @@ from dextron_bench.errors import BadInput
 from dextron_bench.leaderboard import build, collect, highlights
 from dextron_bench.methods import registry
 from dextron_bench.runs import run_files
-from dextron_bench.storage import atomic, folders, tables
+from dextron_bench.storage import atomic, folders
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle, names
@@ -59,8 +59,6 @@ def _put(verdict: Verdict, board: Path) -> Path:
         run = RunFolder.of_seed(place, seed)
         run.path.mkdir(parents=True)
         run_files.store_episodes(run, verdict.tables[seed])
-        if seed in verdict.fresh:
-            tables.write(run.fresh, verdict.fresh[seed])
         atomic.write_json(run.result, structs.replace(result, tier=verdict.tier))
     atomic.write_json(place / bundle.MANIFEST, manifest)
     return place

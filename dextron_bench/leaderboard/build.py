@@ -10,7 +10,7 @@ import pandas as pd
 
 from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.results import Result
-from dextron_bench.leaderboard import readme
+from dextron_bench.leaderboard import readme, round_table
 from dextron_bench.leaderboard.collect import RESULTS
 from dextron_bench.runs import result_files
 from dextron_bench.scores import standings
@@ -23,6 +23,7 @@ from dextron_bench.training import learning_curve
 from dextron_bench.world import model
 
 ORIGIN = ("tier", "frames", "demonstrations", "seconds", "hardware", "privileged")
+IN_TABLE = ("method", "reaches", "rank", "unranked", *round_table.SCORES, "round", "margin")
 Curves = dict[int, pd.DataFrame]  # By seed; columns epoch, return, success.
 
 
@@ -37,19 +38,19 @@ def build(board: Path) -> list[Path]:
     from dextron_bench.scores.figures import training
 
     results = _results_of_this_world(board / RESULTS)
-    rows = standings.table(results)
-    table = _with_origin(rows, results)
+    rows, ranked = standings.table(results), round_table.table(board)
+    table = _with_origin(rows, results).merge(ranked[[*IN_TABLE]], on=["method", "reaches"], how="left")
     files = [board / "table.csv", board / "README.md", board / "table.json"]
     spreadsheet = table.map(lambda value: spreadsheet_cell(value) if isinstance(value, str) else value)
     atomic.write_atomically(files[0], lambda part: spreadsheet.to_csv(part, index=False, float_format="%.6g"))
     atomic.write_atomically(files[2], lambda part: table.to_json(part, orient="records", indent=1))
     curves = _curves_by_source(board / RESULTS)
-    readme.insert(files[1], "\n".join(readme.sections(table, set(curves))))
+    readme.insert(files[1], "\n".join(readme.sections(table, ranked, set(curves))))
     for reaches, by_method in curves.items():
         files.append(board / readme.picture(reaches))
         training.learning_curves(by_method, rows[rows["reaches"] == reaches], files[-1])
     files.append(board / page.FILE)
-    text = page.document(rows, results, curves, board.resolve().parent / FOLDER, _code_of_submissions(board))
+    text = page.document(rows, ranked, results, curves, board.resolve().parent / FOLDER, _code_of_submissions(board))
     atomic.write_atomically(files[-1], lambda part: part.write_text(text, encoding="utf-8"))
     return files
 

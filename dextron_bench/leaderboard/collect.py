@@ -64,10 +64,10 @@ def take(runs: Path, board: Path, only: Collection[str] = ()) -> list[Path]:
 
 
 def run_digest(file: Path) -> str:
-    """The hash of a published result without what is added later: tier, fresh scores, actions, splits under tracks."""
+    """The hash of a published result without what is added later: tier, actions, splits under tracks."""
     result = result_files.read_result(file)
     splits = {name: replace(split, actions=None) for name, split in _plain(result).items()}
-    return hashing.digest(atomic.json_text(replace(result, splits=splits, tier="", fresh=None)).encode())
+    return hashing.digest(atomic.json_text(replace(result, splits=splits, tier="")).encode())
 
 
 def _with_splits(result: Result, keep: Callable[[str], bool]) -> Result:
@@ -96,7 +96,7 @@ def _with_tier(result: Result, before: Result | None) -> Result:
         for name, split in result.splits.items()
     }
     splits |= {name: split for name, split in before.splits.items() if PLUS in name and name not in splits}
-    return replace(result, splits=splits, tier=before.tier or result.tier, fresh=before.fresh or result.fresh)
+    return replace(result, splits=splits, tier=before.tier or result.tier)
 
 
 def _scores(result: Result) -> tuple[dict[str, list[float]], str | None]:

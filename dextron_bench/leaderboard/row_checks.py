@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 
-from dextron_bench.leaderboard import collect, fresh_baselines, verify_board
+from dextron_bench.leaderboard import collect, rounds, verify_board
 from dextron_bench.leaderboard.baseline_check import Finding
-from dextron_bench.leaderboard.verify_board import Row
+from dextron_bench.leaderboard.board_rows import Row
 from dextron_bench.methods import registry
 from dextron_bench.runs import result_files
 from dextron_bench.storage import atomic, hashing, provenance, records
@@ -34,7 +34,6 @@ class RowChecks(ListedWork):
     board: Path
     rows: Sequence[Row]
     count: int = 0
-    redraw: bool = False
     threads: int = 0
 
     def names(self) -> list[str]:
@@ -49,21 +48,20 @@ class RowChecks(ListedWork):
         """What a finding depends on: the published files of the row, the code of its method, and the flags."""
         if (row := self._rows().get(name)) is None:
             return None
-        fresh = [self.board / fresh_baselines.FOLDER / f"{row.result.reaches}{end}" for end in (".json", ".parquet")]
-        files = {file.name: file for file in (row.run.result, row.run.episodes, row.run.fresh, *fresh) if file.exists()}
-        hashes = {name: hashing.sha256(file) for name, file in files.items()}
+        files = [file for file in (row.run.result, row.run.episodes) if file.exists()] + self._round_files()
+        hashes = {file.name: hashing.sha256(file) for file in files}
         method = row.result.maker.method if row.result.maker else None
         code = registry.package_files(registry.find_method(method)) if method in registry.installed_methods() else []
-        flags = {"rows": self.count, "redraw": self.redraw}
-        return {"physics": model.mjcf_hash(), "files": hashes, "code": provenance.code_hash(*code), **flags}
+        about = {"physics": model.mjcf_hash(), "code": provenance.code_hash(*code), "rows": self.count}
+        return {**about, "files": hashes}
 
     def recipe(self, name: str) -> Recipe:
         """How another process makes the check of the piece's row."""
         row = self._rows()[name]
         files = [file for file in visible(row.run.path.parent, "**/*") if file.suffix not in NOT_NEEDED]
-        files += visible(self.board / fresh_baselines.FOLDER, f"{row.result.reaches}.*")
+        files += self._round_files()
         inputs = {f"{BOARD}/{file.relative_to(self.board).as_posix()}": file for file in files if file.is_file()}
-        again = partial(_check_again, identity=row.run.identity, count=self.count, redraw=self.redraw)
+        again = partial(_check_again, identity=row.run.identity, count=self.count)
         return Recipe(again, row.result.reaches, inputs)
 
     def play(self, name: str, report: Progress = no_progress) -> list[Path]:
@@ -90,11 +88,16 @@ class RowChecks(ListedWork):
         return {row.run.identity.replace("/", "-"): row for row in self.rows}
 
     def _check(self, row: Row, report: Progress) -> Finding:
-        return verify_board.check(row, self.board, self.count, self.redraw, self.threads, report)
+        return verify_board.check(row, self.board, self.count, self.threads, report)
+
+    def _round_files(self) -> list[Path]:
+        """The files of the latest round; none before the first."""
+        latest = rounds.latest(self.board)
+        return visible(latest.folder, "*") if latest else []
 
 
-def _check_again(place: Place, identity: str, count: int, redraw: bool) -> RowChecks:
+def _check_again(place: Place, identity: str, count: int) -> RowChecks:
     """The check of a row whose files another process has put below the folder of runs."""
     run = RunFolder(place.runs / BOARD / collect.RESULTS / identity)
     row = Row(run, result_files.read_result(run.result))
-    return RowChecks(place.folder, place.runs / BOARD, [row], count, redraw, place.threads)
+    return RowChecks(place.folder, place.runs / BOARD, [row], count, place.threads)

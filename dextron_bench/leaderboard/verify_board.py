@@ -4,72 +4,42 @@ from __future__ import annotations
 
 import filecmp
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from msgspec.structs import asdict, replace
 
-from dextron_bench.errors import NotFound
 from dextron_bench.evaluation.declaration import Declaration
-from dextron_bench.evaluation.results import Result, scores_by_split
-from dextron_bench.leaderboard import baseline_check, build, collect, fresh_baselines
+from dextron_bench.evaluation.results import scores_by_split
+from dextron_bench.leaderboard import baseline_check, build, round_check, rounds
 from dextron_bench.leaderboard.baseline_check import Finding
+from dextron_bench.leaderboard.board_rows import Row
 from dextron_bench.leaderboard.highlights import FOLDER
 from dextron_bench.reaches import sources
 from dextron_bench.reaches.recorded.cache import MissingData
-from dextron_bench.runs import result_files
 from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage import atomic, hashing, records
 from dextron_bench.storage.folders import copy_tree, visible
 from dextron_bench.storage.progress import Progress, no_progress
-from dextron_bench.storage.run_folder import RunFolder, seed_folders
+from dextron_bench.storage.run_folder import seed_folders
 from dextron_bench.submissions import bundle, episode_tables, replay_check
 from dextron_bench.submissions.manifest import Manifest
 
 BUILT = (".md", ".csv", ".json", ".html")  # Files that are compared byte by byte; pictures are not.
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """A result on the board."""
+def check(row: Row, board: Path, count: int = 0, threads: int = 0, report: Progress = no_progress) -> Finding:
+    """Verifies a row of a board, and what it played in the latest round.
 
-    run: RunFolder
-    result: Result
-
-    @property
-    def name(self) -> str:
-        """Method, source of reaches and seed, in words."""
-        return f"{self.result.method}, {self.result.reaches} reaches, seed {self.result.seed}"
-
-
-def rows(board: Path, methods: Sequence[str] = (), reaches: Sequence[str] = ()) -> list[Row]:
-    """The rows of a board for these methods and sources, all if empty; raises NotFound, DamagedFile."""
-    published = [
-        Row(run, result_files.read_result(run.result)) for run in result_files.finished(board / collect.RESULTS)
-    ]
-    selected = [row for row in published if not methods or row.result.method in methods]
-    selected = [row for row in selected if not reaches or row.result.reaches in reaches]
-    if not selected:
-        names = ", ".join(sorted({row.result.method for row in published})) or "none"
-        raise NotFound(f"{board} has no such rows; its methods: {names}")
-    return selected
-
-
-def check(
-    row: Row, board: Path, count: int = 0, redraw: bool = False, threads: int = 0, report: Progress = no_progress
-) -> Finding:
-    """Verifies a row of a board; runs a baseline again on `count` rows of each split, drawn at random, 0 for all.
-
-    With `redraw`, fresh settings are drawn again from their beacon, too.
+    Runs a baseline again on `count` rows of each split, drawn at random, 0 for all.
     """
     try:
         if row.run.episodes.exists():
             finding = _replay(row, threads, report)
         else:
             finding = baseline_check.rerun(row.run, row.result, count, threads, report)
-        if not finding.problems:
-            finding.problems += fresh_baselines.problems(row.run, row.result, board, count, redraw, threads, report)
+        if not finding.problems and (latest := rounds.latest(board)):
+            finding.problems += round_check.row_problems(latest, row, count, threads)
     except MissingData as error:
         return Finding("", [f"not checked: {error}"])
     return finding

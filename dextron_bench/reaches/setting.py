@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 import pandas as pd
@@ -111,15 +112,29 @@ class ReachSource:
         except KeyError:
             raise UnknownReach(name, self.name, self.names) from None
 
+    def on_reaches(self, names: Sequence[str]) -> Self:
+        """The same source, which draws settings on these reaches alone."""
+        part = copy.copy(self)
+        part.names = tuple(names)
+        return part
+
+    def new_reaches(self, count: int, rng: np.random.Generator) -> list[str]:
+        """Names of reaches that `names` has not; none if the source has no others."""
+        return []
+
     def sample(self, rng: np.random.Generator) -> Setting:
-        """Draws a setting. It draws the noise again if that makes the reach faster than the recording."""
+        """Draws a setting."""
         name = self.names[rng.integers(len(self.names))]
         offset_x, offset_y = rng.uniform(-OFFSET, OFFSET, 2)
+        return Setting(name, float(offset_x), float(offset_y), self.sample_noise(name, rng))
+
+    def sample_noise(self, name: str, rng: np.random.Generator) -> float:
+        """Draws the duration noise of a reach. It draws again if that makes the reach faster than the recording."""
         recorded = self.reach(name).duration
         while True:
             noise = float(rng.standard_normal())
             if scaled_duration(recorded, noise) >= recorded:
-                return Setting(name, float(offset_x), float(offset_y), noise)
+                return noise
 
     def path(self, setting: Setting) -> Trajectory:
         """The scaled, centred and shifted path of a setting. Raises UnknownReach or BadInput."""

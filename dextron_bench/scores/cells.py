@@ -57,24 +57,19 @@ def interquartile_mean(row: Row) -> Score:
     return _score(row, "iqm", 2)
 
 
-def fresh(row: Row) -> Score:
-    """Mean return on fresh settings, 0 to 20."""
-    return _score(row, "fresh", 2)
-
-
-def gap(row: Row) -> Score:
-    """How much more the method scores on the split than on fresh settings."""
-    return _score(row, "gap", 2)
-
-
-def mark(row: Row) -> str:
-    """What a marked row says of its gap, which is beyond noise; empty for other rows."""
-    return "not on fresh settings" if row.get("marked") else ""
+def score(row: Row) -> Score:
+    """The score of a round [%]."""
+    return _score(row, "score", 1, 100.0)
 
 
 def regret(row: Row) -> str:
     """How much more EXP scores than the method."""
     return _number(row.get("regret"), 2)
+
+
+def share(row: Row, split: str) -> str:
+    """The share of a split's settings that a method solves in a round [%]."""
+    return _number(row.get(split), 1, 100.0)
 
 
 def cause_shares(row: Row) -> list[str]:

@@ -1,4 +1,4 @@
-"""Compares methods on equal settings: differences, settings that flip, and ranks (docs/statistics.md).
+"""Compares methods on equal settings: differences, and settings that flip (docs/statistics.md).
 
 Scores are arrays (seeds, settings). A column is the same setting for all methods.
 """
@@ -6,7 +6,7 @@ Scores are arrays (seeds, settings). A column is the same setting for all method
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,6 @@ from scipy.stats import binomtest, norm
 from dextron_bench.scores import statistics
 from dextron_bench.scores.statistics import RETURNS, Bounds, Part
 
-NOISE = 3.29  # Standard errors; a difference due to chance exceeds them once in two thousand times.
 SIGNIFICANT = 1.0 - statistics.LEVEL  # The largest p value that counts as a difference.
 FEW = 6  # Settings: fewer of them, all with one sign, happen by chance in more than 5 % (sign test).
 POWER = 0.8  # Chance that a difference of the size `detectable` is significant.
@@ -49,20 +48,16 @@ class Flips:
     p_value: float
 
 
-def difference(a: np.ndarray, b: np.ndarray, bounds: Bounds = RETURNS, same_settings: bool = True) -> Difference:
-    """Mean of scores B minus mean of scores A, both (seeds, settings), with the interval that ranks and `compare` use.
+def difference(a: np.ndarray, b: np.ndarray, bounds: Bounds = RETURNS) -> Difference:
+    """Mean of scores B minus mean of scores A, both (seeds, settings), with the interval that `compare` uses.
 
     The parts of its variance are the differences of settings and, for a method with several seeds, these seeds.
-    Without `same_settings` the settings of each method are a part of their own. `bounds` are the smallest and the
+    `bounds` are the smallest and the
     largest possible score. (b, a) gives the opposite of (a, b), and equal scores give equal bits.
     """
     seeds = pooled([*statistics.parts_of_seeds(a), *statistics.parts_of_seeds(b)])
-    if same_settings:
-        sums = len(a) * b.sum(axis=0) - len(b) * a.sum(axis=0)
-        settings = [_part_of_few(sums) or statistics.part_of_mean(sums, len(a) * len(b))]
-    else:
-        settings = [statistics.part_of_settings(a), statistics.part_of_settings(b)]
-    parts = [*settings, *seeds]
+    sums = len(a) * b.sum(axis=0) - len(b) * a.sum(axis=0)
+    parts = [_part_of_few(sums) or statistics.part_of_mean(sums, len(a) * len(b)), *seeds]
     mean = float(b.mean() - a.mean())
     estimate = statistics.interval(mean, parts, _bounds_of_difference(bounds))
     return Difference(estimate.mean, estimate.low, estimate.high, detectable(parts), statistics.p_value(mean, parts))
@@ -106,30 +101,6 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return corrected
 
 
-@dataclass(frozen=True, slots=True)
-class Gap(statistics.Estimate):
-    """How much more a method scores on known settings than on fresh ones, with its 95 % interval.
-
-    `is_beyond_noise` is true if it exceeds NOISE standard errors: few honest rows of a large board may do so by chance.
-    """
-
-    is_beyond_noise: bool
-
-
-def gap(known: np.ndarray, fresh: np.ndarray) -> Gap:
-    """Mean of scores on known settings minus mean on fresh settings, both (seeds, settings) of one method.
-
-    The parts of its variance are the settings of both kinds and, if there are several seeds, the gaps of these seeds.
-    """
-    parts = [statistics.part_of_settings(known), statistics.part_of_settings(fresh)]
-    if len(known) > 1:
-        sums = fresh.shape[1] * known.sum(axis=1) - known.shape[1] * fresh.sum(axis=1)
-        parts.append(statistics.part_of_mean(sums, known.shape[1] * fresh.shape[1]))
-    estimate = statistics.interval(float(known.mean() - fresh.mean()), parts, _bounds_of_difference(RETURNS))
-    beyond = estimate.mean > NOISE * statistics.standard_error(parts)
-    return Gap(estimate.mean, estimate.low, estimate.high, beyond)
-
-
 def flips(a: np.ndarray, b: np.ndarray) -> Flips:
     """Rows that flip between successes A and B, booleans (seeds, settings), with McNemar's exact test.
 
@@ -142,26 +113,3 @@ def flips(a: np.ndarray, b: np.ndarray) -> Flips:
     gained, lost = np.flatnonzero(more > 0), np.flatnonzero(more < 0)
     changed = len(gained) + len(lost)
     return Flips(gained, lost, float(binomtest(len(gained), changed).pvalue) if changed else 1.0)
-
-
-def ranks(scores: Sequence[np.ndarray], own_settings: Collection[int] = ()) -> list[int]:
-    """Ranks from 1; methods that do not differ significantly from the best of their group share its rank.
-
-    Methods are taken from the highest mean down. A method starts a new group if the interval of its
-    `difference` from the first method of the current group excludes 0; its rank is then its position.
-    Each entry of `scores` is (seeds, settings) on the same settings; those at the places `own_settings` are on settings
-    that no other method has. Equal means are ordered by their scores, so the
-    order of the input does not matter.
-    """
-    order = sorted(range(len(scores)), key=lambda method: (-scores[method].mean(), scores[method].tobytes()))
-    method_ranks, rank, leader = [0] * len(scores), 0, -1
-    for position, method in enumerate(order, start=1):
-        same = method not in own_settings and leader not in own_settings
-        if rank == 0 or _is_significant(difference(scores[leader], scores[method], same_settings=same)):
-            leader, rank = method, position
-        method_ranks[method] = rank
-    return method_ranks
-
-
-def _is_significant(result: Difference) -> bool:
-    return result.low > 0.0 or result.high < 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,8 @@ class HardSettings:
     """New settings near settings of `train` that the rule of thumb fails when it closes at `distance` [m].
 
     No setting is near-equal to one of `train` or `held_out`. A scan of `coarse` points sorts out most draws, and one of
-    `fine` points decides.
+    `fine` points decides. Settings have the duration noise of the setting that they are near, or one that `new_noise`
+    draws for a reach.
     """
 
     scanner: Scanner
@@ -37,6 +39,7 @@ class HardSettings:
     distance: float
     coarse: int
     fine: int
+    new_noise: Callable[[str, np.random.Generator], float] | None = None
 
     def draw(self, count: int, seed: int, progress: Progress = no_progress) -> pd.DataFrame:
         """`count` settings with gain, best d_c and window, at most WINDOW; the rule solves at most RULE_SHARE."""
@@ -47,7 +50,7 @@ class HardSettings:
             progress(min(len(hard), count), count)
             if len(hard) >= count:
                 break
-            draws = _draw_block(failed, np.random.default_rng([seed, number, 5]))
+            draws = self._draw_block(failed, np.random.default_rng([seed, number, 5]))
             if not left:  # Then no row that the rule solves is kept: it goes before the scans, which take longer.
                 draws = draws[~self._rule_solves(draws)]
             rows = without_near_equal(without_near_equal(self._narrow(draws), self.train), self.held_out)
@@ -56,6 +59,16 @@ class HardSettings:
             left -= int((solved & kept).sum())
             hard = pd.concat([hard, rows[kept]], ignore_index=True)
         return hard.head(count)
+
+    def _draw_block(self, settings: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+        """BLOCK settings, each near a random one of `settings`: other offsets and a new gain."""
+        rows = settings.iloc[rng.integers(len(settings), size=BLOCK)][SETTING].reset_index(drop=True)
+        for name in ("offset_x", "offset_y"):
+            rows[name] = (rows[name] + rng.uniform(-APART, APART, BLOCK)).clip(-setting.OFFSET, setting.OFFSET)
+        rows["gain"] = rng.uniform(*policies.GAIN, BLOCK)
+        if self.new_noise is None:
+            return rows
+        return rows.assign(duration_noise=[self.new_noise(reach, rng) for reach in rows["reach"]])
 
     def _rule_solves(self, rows: pd.DataFrame) -> np.ndarray:
         return rule_scores(self.scanner, rows, np.array([self.distance]))[:, 0] == task.SUCCESS
@@ -68,14 +81,6 @@ class HardSettings:
         windows = success_window(scores)
         measured = likely.assign(critical=best_critical(scores), window=windows)
         return measured[(windows > 0) & (windows <= WINDOW)]
-
-
-def _draw_block(settings: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
-    """BLOCK settings, each near a random one of `settings`: other offsets, an equal duration noise, a new gain."""
-    rows = settings.iloc[rng.integers(len(settings), size=BLOCK)][SETTING].reset_index(drop=True)
-    for name in ("offset_x", "offset_y"):
-        rows[name] = (rows[name] + rng.uniform(-APART, APART, BLOCK)).clip(-setting.OFFSET, setting.OFFSET)
-    return rows.assign(gain=rng.uniform(*policies.GAIN, BLOCK))
 
 
 def best_distance(scanner: Scanner, rows: pd.DataFrame) -> float:

@@ -91,11 +91,6 @@ class RunFolder:
         return self.path / "episodes.parquet"
 
     @property
-    def fresh(self) -> Path:
-        """The file of the table of episodes on fresh settings."""
-        return self.path / "fresh.parquet"
-
-    @property
     def result(self) -> Path:
         """The file with the scores of all episodes, from which the leaderboard is computed."""
         return self.path / "result.json"

@@ -58,7 +58,6 @@ EPISODES: Columns = {  # Of a run.
     "closing_lag": finite_or_missing,
 }
 CASES: Columns = {**SETTING, "split": texts, "gain": finite, "critical": finite}  # Of fresh settings.
-FRESH_EPISODES: Columns = {**EPISODES, **CASES}
 DRAWS: Columns = {  # Of a block of a search.
     **SETTING, "gain": finite, "critical": finite, "score": returns, "length": finite_or_missing
 }  # fmt: skip

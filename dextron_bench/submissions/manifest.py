@@ -50,6 +50,7 @@ class Declared(Strict, frozen=True):
     authors: Text500
     url: Annotated[str, Meta(max_length=500, pattern=r'^(https?://[^\s<>"]+)?$')]
     notes: Annotated[str, Meta(max_length=2000)]
+    rule: bool = False
 
 
 class Manifest(Strict, frozen=True):

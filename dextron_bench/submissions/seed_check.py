@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pandas as pd
 from msgspec import structs
 from msgspec.structs import replace
 
-from dextron_bench.evaluation import episode_table
 from dextron_bench.evaluation.declaration import Declaration
 from dextron_bench.evaluation.episodes import Episode, fingerprint
 from dextron_bench.evaluation.results import Replay, Result, scores_by_split
@@ -91,18 +90,6 @@ class SeedCheck:
             differing.append(str(error))
         finding.add(*differing)
         return finding
-
-    def play_fresh(self, splits: Sequence[Split], how: Playing) -> pd.DataFrame:
-        """The table of the agent's episodes on fresh settings; raises AgentError, BadBundle."""
-        source, rows = sources.open_source(self._manifest.reaches), []
-        launch = relaunch.launch_of(self._manifest.agent, self._agent_files, how.trust)
-        total = sum(len(split) for split in splits)
-        for split in splits:
-            for row, episode in playing.play_shuffled(launch, source, split, self._seed, how.limits, how.threads):
-                expert = split.case(row).expert
-                rows.append(episode_table.row(split, row, episode) | asdict(expert))
-                how.report(len(rows), total, f"seed {self._seed}, fresh settings")
-        return pd.DataFrame(rows).sort_values(["split", "row"], ignore_index=True)
 
     def _read(self) -> tuple[pd.DataFrame, Result, Provenance]:
         """The table of episodes, the result and the provenance of the run; raises BadBundle, DamagedFile."""

@@ -39,7 +39,7 @@ class SeedFinding:
 class Verdict:
     """What verification finds for a submission: problems, notes, and the results computed anew, by seed.
 
-    `tables` are the episodes as they were played again, and `fresh` the episodes on fresh settings.
+    `tables` are the episodes as they were played again.
     """
 
     manifest: Manifest
@@ -50,7 +50,6 @@ class Verdict:
     notes: list[str] = field(default_factory=list)
     results: dict[int, Result] = field(default_factory=dict)
     tables: dict[int, pd.DataFrame] = field(default_factory=dict)
-    fresh: dict[int, pd.DataFrame] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:

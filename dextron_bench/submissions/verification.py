@@ -9,14 +9,10 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from msgspec.structs import replace
-
-from dextron_bench.methods.agents import AgentError
 from dextron_bench.methods.isolation import sandbox
-from dextron_bench.splits.fresh_settings import FreshSettings
 from dextron_bench.splits.loading import load_split, ranking_splits
 from dextron_bench.storage.run_folder import seed_folders
-from dextron_bench.submissions import bundle, duplicates
+from dextron_bench.submissions import duplicates
 from dextron_bench.submissions.manifest import Manifest
 from dextron_bench.submissions.seed_check import Playing, SeedCheck
 from dextron_bench.submissions.verdict import Verdict
@@ -29,12 +25,11 @@ def verify(
     board: Path | None = None,
     how: Playing | None = None,
     rerun: bool = False,
-    fresh: FreshSettings | None = None,
 ) -> Verdict:
     """Checks an unpacked bundle (see `bundle.unpack`) against the splits, the engine and the results on a board.
 
     With `rerun` the agent also runs again, from the files in the bundle, and in the sandbox only unless `how` trusts
-    it; then it also plays `fresh` settings, if they are given. Raises MissingData, OSError.
+    it. Raises MissingData, OSError.
     """
     how, verdict, numbers = how or Playing(), Verdict(manifest), manifest.seeds
     if manifest.physics != model.mjcf_hash():
@@ -50,8 +45,6 @@ def verify(
         verdict.problems.append(f"holds seed{extra[0]}, which is not among the seeds that its manifest lists")
     if rerun and verdict.passed:
         _rerun(folder, seeds, verdict, how)
-        if fresh is not None and verdict.passed:
-            _play_fresh(fresh, seeds, verdict, how)
     _check_copies(verdict, board)
     return verdict
 
@@ -78,16 +71,3 @@ def _rerun(folder: Path, seeds: Sequence[SeedCheck], verdict: Verdict, how: Play
         verdict.notes.append("the agent ran again without a sandbox, with your rights: its tier stays `replayed`")
     elif verdict.passed:
         verdict.tier = "re-run"
-
-
-def _play_fresh(fresh: FreshSettings, seeds: Sequence[SeedCheck], verdict: Verdict, how: Playing) -> None:
-    """Lets the agent of each seed play fresh settings, and adds their scores to the results."""
-    splits = fresh.draw(verdict.manifest.reaches, how.threads, how.report)
-    for seed, (number, result) in zip(seeds, list(verdict.results.items()), strict=True):
-        try:
-            table = seed.play_fresh(splits, how)
-        except (AgentError, bundle.BadBundle) as error:
-            verdict.problems.append(f"on fresh settings: {error}")
-            return
-        verdict.fresh[number] = table
-        verdict.results[number] = replace(result, fresh=fresh.scores(table))

@@ -18,7 +18,6 @@ from msgspec import to_builtins
 from dextron_bench.evaluation.results import scores_by_split
 from dextron_bench.methods.isolation.isolated_agent import Limits
 from dextron_bench.runs import run_files
-from dextron_bench.splits.fresh_settings import FreshSettings
 from dextron_bench.storage import hashing
 from dextron_bench.storage.run_folder import RunFolder
 from dextron_bench.submissions import bundle, playing, verification
@@ -80,7 +79,7 @@ class Forgery:
         table = pd.read_parquet(RunFolder(self.seed).episodes)
         self.json("seed0/result.json", lambda result: result.update(splits=to_builtins(scores_by_split(table))))
 
-    def checked(self, *, rerun: bool = False, fresh: FreshSettings | None = None, **how: Any) -> Verdict:
+    def checked(self, *, rerun: bool = False, **how: Any) -> Verdict:
         """Packs the bundle with correct hashes, and verifies it; `how` are fields of `Playing`."""
         manifest = json.loads((self.folder / bundle.MANIFEST).read_text())
         files = {str(path.relative_to(self.folder)): path for path in self.folder.rglob("*") if path.is_file()}
@@ -92,9 +91,7 @@ class Forgery:
                 archive.write(files[name], name)
         into = self.folder.with_name("again")
         shutil.rmtree(into, ignore_errors=True)
-        return verification.verify(
-            into, bundle.unpack(packed, into), self.board, Playing(threads=1, **how), rerun, fresh
-        )
+        return verification.verify(into, bundle.unpack(packed, into), self.board, Playing(threads=1, **how), rerun)
 
 
 def play(here: Path) -> Path:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dextron_bench.errors import BadInput
-from dextron_bench.leaderboard import add, build, verify_board
+from dextron_bench.leaderboard import add, board_rows, build, verify_board
 from dextron_bench.recording import read_safely
 from dextron_bench.world import task
 from tests.helpers import tiny_benchmark
@@ -76,5 +76,5 @@ def test_the_board_keeps_the_code_of_a_submission_and_records_a_success_and_a_fa
     assert f'href="results/near/{tiny_benchmark.NAME}/agent/near.py"' in page
     assert page.count('href="../recordings/near-success.rrd"') >= 1
     (place / "agent/near.py").write_text("print()")
-    (row,) = verify_board.rows(board)
+    (row,) = board_rows.rows(board)
     assert verify_board.check(row, board, threads=1).problems == ["its manifest lists another agent/near.py"]

@@ -11,9 +11,7 @@ import pytest
 from dextron_bench import recording
 from dextron_bench.cli import main
 from dextron_bench.methods.isolation import sandbox
-from dextron_bench.splits import fresh
 from dextron_bench.storage import folders
-from tests.submissions.test_fresh_settings import draw
 
 
 @pytest.mark.slow
@@ -21,7 +19,6 @@ def test_the_command_line_submits_verifies_adds_and_verifies_the_board(
     submitted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(fresh, "draw", draw)
     words = [
         "submit",
         f"{submitted}/near.py:Near",

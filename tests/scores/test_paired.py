@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -148,76 +148,7 @@ def test_swapping_the_methods_swaps_gained_and_lost(a: np.ndarray, b: np.ndarray
     assert 0.0 < forward.p_value <= 1.0
 
 
-def around(*means: float) -> list[np.ndarray]:
-    """Scores of independent methods, one seed each, on 400 settings; each mean has a standard error of 1."""
-    random, noise = np.random.default_rng(4), np.repeat([-20.0, 20.0], 200)
-    return [mean + random.permutation(noise)[None] for mean in means]
-
-
-def test_methods_share_a_rank_if_they_do_not_differ_from_the_best_of_their_group():
-    """Standard errors of differences are 1.4: 20 and 14 differ significantly, 20 and 19 do not, nor do 14 and 13."""
-    assert paired.ranks(around(13.0, 20.0, 5.0, 19.0, 14.0)) == [3, 1, 5, 1, 3]
-
-
-def test_a_group_ends_at_the_first_method_that_differs_from_its_best():
-    """Neighbours are 2 apart: not significant. 20 and 16 are 4 apart: significant, so 16 starts a new group."""
-    assert paired.ranks(around(20.0, 18.0, 16.0, 14.0)) == [1, 1, 3, 3]
-
-
 def test_pairs_are_tested_by_the_noise_of_their_difference():
     """Each mean has a standard error of 1, but a draw of settings that helps one method helps the other too."""
-    (common,) = around(0.0)
-    assert paired.ranks([10.0 + common, 9.9 + common]) == [1, 2]
-
-
-def test_with_equal_means_the_same_method_leads_the_group_in_any_order():
-    """The third differs significantly from the method without noise, but not from the noisy one."""
-    (noisy,) = around(10.0)
-    exact, third = np.full((1, 400), 10.0), np.full((1, 400), 9.5)
-    one, other, last = paired.ranks([exact, noisy, third])
-    assert paired.ranks([noisy, exact, third]) == [other, one, last]
-
-
-def test_no_methods_have_no_ranks():
-    assert paired.ranks([]) == []
-
-
-@settings(max_examples=25)
-@given(scores(2), scores(3))
-def test_two_methods_share_a_rank_if_the_interval_holds_0(a: np.ndarray, b: np.ndarray):
-    result = paired.difference(a, b)
-    assert (paired.ranks([a, b]) == [1, 1]) == (result.low <= 0.0 <= result.high)
-
-
-@settings(max_examples=25)
-@given(st.lists(scores(2), min_size=2, max_size=5), st.randoms(use_true_random=False))
-def test_ranks_do_not_depend_on_the_order_of_methods(boards: list[np.ndarray], random):
-    order = random.sample(range(len(boards)), len(boards))
-    assume(order != sorted(order))
-    ranks = paired.ranks(boards)
-    assert paired.ranks([boards[k] for k in order]) == [ranks[k] for k in order]
-    assert min(ranks) == 1
-    assert ranks[int(np.argmax([board.mean() for board in boards]))] == 1
-
-
-def test_a_gap_is_beyond_noise_above_3_29_standard_errors():
-    """400 settings of 0 or 20 have a standard error of 1; two independent means differ with one of 1.41, so 4.65."""
-    known, fresh = around(15.0, 10.0)
-    result = paired.gap(known, fresh)
-    assert result.mean == pytest.approx(5.0)
-    assert (result.high - result.low) / 2 == pytest.approx(1.96 * 2**0.5, rel=0.1)
-    assert result.is_beyond_noise
-    assert not paired.gap(known, fresh + 1.0).is_beyond_noise
-    assert not paired.gap(fresh, known).is_beyond_noise  # Better on fresh settings.
-
-
-def test_a_gap_may_have_other_numbers_of_settings():
-    assert paired.gap(np.full((2, 4), 20.0), np.full((2, 7), 5.0)) == paired.Gap(15.0, 15.0, 15.0, True)
-
-
-def test_methods_on_settings_of_their_own_are_compared_without_pairs():
-    """A common draw of settings makes 0.1 certain; on settings of its own, the second method is within noise."""
-    (common,) = around(0.0)
-    boards = [10.0 + common, 9.9 + common]
-    assert paired.ranks(boards, own_settings=[1]) == [1, 1]
-    assert paired.ranks([10.0 + common, 2.0 + common[:, :100]], own_settings=[1]) == [1, 2]
+    common = np.random.default_rng(4).permutation(np.repeat([-20.0, 20.0], 200))[None]
+    assert paired.difference(10.0 + common, 9.9 + common).is_worse

@@ -9,7 +9,6 @@ from dextron_bench.errors import BadInput
 from dextron_bench.evaluation.results import Result
 from dextron_bench.scores import standings
 from dextron_bench.splits import strata
-from dextron_bench.splits.fresh_settings import FreshScores, FreshSplitScores
 from dextron_bench.splits.loading import load_split
 from tests.helpers import results
 
@@ -60,22 +59,6 @@ def column(played: list[Result], name: str) -> dict:
     return standings.table(played).set_index("method")[name].to_dict()
 
 
-def test_methods_are_ranked_but_the_ceiling_is_not():
-    ranks = column([noisy("exp", 9.0), noisy("bc", 4.0), noisy("rl", 0.0), noisy("nothing", -6.0)], "rank")
-    assert np.isnan(ranks.pop("exp"))
-    assert ranks == {"bc": 1, "rl": 2, "nothing": 3}
-
-
-def test_no_method_is_ranked_on_minjerk_reaches():
-    rows = standings.table([noisy("sim", 4.0, reaches="minjerk"), noisy("nothing", 0.0, reaches="minjerk")])
-    assert rows["rank"].isna().all()
-
-
-def test_ranks_are_by_source_split_and_version():
-    rows = standings.table([noisy("a", 4.0), noisy("b", 0.0), noisy("b", 0.0, digest="b" * 64)])
-    assert rows["rank"].tolist() == [1, 2, 1]
-
-
 def test_regret_is_the_lead_of_exp():
     regrets = column(
         [result("exp", 0, [20.0, 12.0]), result("a", 0, [10.0, 2.0]), result("a", 1, [20.0, 4.0])], "regret"
@@ -90,11 +73,8 @@ def test_without_exp_there_is_no_regret():
 def test_a_new_method_changes_no_other_interval():
     alone = [noisy("a", 1.0, seed) for seed in range(3)]
     rows = standings.table([*(noisy("b", 5.0, seed) for seed in range(3)), *alone])
-    assert rows["rank"].tolist() == [1, 2]
-    pd.testing.assert_frame_equal(
-        rows[rows["method"] == "a"].drop(columns="rank").reset_index(drop=True),
-        standings.table(alone).drop(columns="rank"),
-    )
+    assert rows["method"].tolist() == ["b", "a"]
+    pd.testing.assert_frame_equal(rows[rows["method"] == "a"].reset_index(drop=True), standings.table(alone))
 
 
 def test_the_interquartile_mean_of_a_shipped_split_is_taken_over_its_regions():
@@ -117,37 +97,7 @@ def test_results_with_fewer_rows_than_the_shipped_split_are_refused():
         standings.table([result("a", 0, [1.0, 2.0], load_split("real", "test").digest)])
 
 
-def test_seeds_of_two_methods_are_drawn_independently():
-    """A's seeds are 1 better than B's, but far apart. If they were drawn together, the difference would always be 1."""
-    seeds = (0.0, 9.0, 18.0)
-    played = [
-        result(method, k, [lead + mean] * 50)
-        for method, lead in (("a", 1.0), ("b", 0.0))
-        for k, mean in enumerate(seeds)
-    ]
-    assert column(played, "rank") == {"a": 1, "b": 1}
-
-
-def with_fresh(one: Result, scores: list[float], digest: str = "f" * 64) -> Result:
-    return replace(one, fresh=FreshScores("b", "s", {"test": FreshSplitScores(digest, scores)}))
-
-
-def test_a_gap_beyond_noise_marks_a_row_and_ranks_it_by_its_fresh_scores():
-    """It knows the split by heart: 20 there, 3 on fresh settings, so that it comes after a method with 10."""
-    memory = with_fresh(result("memory", 0, [20.0] * 50), [3.0, 0.0, 6.0] * 10)
-    honest = with_fresh(noisy("honest", 0.0), noisy("honest", 0.0, seed=1).splits["test"].scores)
-    rows = standings.table([memory, honest])
-    assert rows["method"].tolist() == ["honest", "memory"]
-    assert rows["marked"].tolist() == [False, True]
-    assert rows["rank"].tolist() == [1, 2]
-    marked = rows.to_dict("records")[1]
-    assert (marked["return"], marked["fresh"], marked["gap"]) == (20.0, 3.0, 17.0)
-    assert marked["gap_low"] < 17.0 < marked["gap_high"]
-
-
-def test_fresh_scores_count_only_if_every_seed_has_them_on_equal_settings():
-    seeds = [result("a", k, [20.0, 20.0]) for k in range(2)]
-    assert np.isnan(column([with_fresh(seeds[0], [5.0]), seeds[1]], "fresh")["a"])
-    others = [with_fresh(seeds[0], [5.0]), with_fresh(seeds[1], [5.0], digest="e" * 64)]
-    assert np.isnan(column(others, "fresh")["a"])
-    assert column([with_fresh(seed, [5.0]) for seed in seeds], "fresh")["a"] == 5.0
+def test_the_ceiling_has_no_rank_and_no_method_has_one_on_minjerk_reaches():
+    assert standings.is_ranked("bc", "real")
+    assert not standings.is_ranked("exp", "real")
+    assert not standings.is_ranked("sim", "minjerk")

@@ -39,7 +39,7 @@ def instant(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def solved(seed: int, count: int = 150) -> pd.DataFrame:
-    return fresh.solved(SOURCE, frozenset("a"), count, seed, ENGINE)
+    return fresh.solved(SOURCE.on_reaches("a"), count, seed, ENGINE)
 
 
 def test_there_are_as_many_as_asked_for_on_the_reaches_only_with_an_expert_that_solves_each():
@@ -70,31 +70,27 @@ def tiny(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     tiny_benchmark.forget()
 
 
-def test_a_fresh_split_has_as_many_rows_as_the_shipped_one_on_reaches_of_the_same_distribution(tiny: None):
+def test_fresh_splits_have_reaches_of_the_same_distribution(tiny: None):
     """`test` has reaches a and b; `unseen-reach` has b only."""
-    drawn = fresh.draw("synthetic", "test", 7, ENGINE)
-    assert (drawn.name, len(drawn.cases)) == ("test", 2)
-    held_out = fresh.draw("synthetic", "unseen-reach", 7, ENGINE, rows=30)
-    assert (len(held_out.cases), {case.setting.reach for case in held_out.cases}) == (30, {"b"})
-    assert {case.setting.reach for case in fresh.draw("synthetic", "test", 7, ENGINE, rows=30).cases} == {"a", "b"}
-    assert held_out.digest != fresh.draw("synthetic", "unseen-reach", 8, ENGINE, rows=30).digest
+    drawn = {split.name: split for split in fresh.draw("synthetic", 7, ENGINE, 30)}
+    assert list(drawn) == ["test", "unseen-reach"]
+    reaches = {name: {case.setting.reach for case in split.cases} for name, split in drawn.items()}
+    assert reaches == {"test": {"a", "b"}, "unseen-reach": {"b"}}
+    assert [len(split) for split in drawn.values()] == [30, 30]
+    others = {split.name: split.digest for split in fresh.draw("synthetic", 8, ENGINE, 30)}
+    assert all(others[name] != split.digest for name, split in drawn.items())
 
 
-def test_the_seed_depends_on_the_submission_and_on_the_beacon():
-    seeds = {fresh.seed_of(submission, beacon) for submission in "ab" for beacon in "xy"}
-    assert len(seeds) == 4
-    assert all(0 <= seed < 2**64 for seed in seeds)
-
-
-@pytest.mark.parametrize("name", ["open", "train"])
-def test_splits_that_no_search_draws_are_refused(name: str):
-    with pytest.raises(BadInput, match="is not drawn by a search"):
-        fresh.draw("synthetic", name, 0, ENGINE)
+def test_minjerk_has_no_fresh_settings():
+    with pytest.raises(BadInput, match="are not drawn by a search"):
+        fresh.draw("minjerk", 0, ENGINE, 2)
 
 
 @pytest.mark.slow
 def test_experts_solve_fresh_settings_of_a_shipped_split(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(fresh, "BLOCK", 16)
     source = open_source("synthetic")
-    drawn = fresh.draw("synthetic", "test", 0, Engine(128, 2), rows=3)
-    assert [episode.score for _, episode in rollout(ExpertAgent(), source, drawn.cases)] == [20.0] * 3
+    monkeypatch.setattr(fresh, "ranking_splits", lambda reaches: ("test",))
+    [drawn] = fresh.draw("synthetic", 0, Engine(128, 2), 3)
+    assert [episode.score for _, episode in rollout(ExpertAgent(), source, drawn)] == [20.0] * 3
+    assert not {case.setting.reach for case in drawn.cases} & set(source.names)  # Its reaches are new.

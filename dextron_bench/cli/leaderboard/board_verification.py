@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
 from dextron_bench.cli.support.output import progress_bar
-from dextron_bench.leaderboard import build
+from dextron_bench.leaderboard import board_rows, build, round_check, rounds
 from dextron_bench.leaderboard import verify_board as board
 from dextron_bench.leaderboard.row_checks import RowChecks
 from dextron_bench.storage.printable import printable_line
@@ -23,8 +23,8 @@ def verify_board(flags: BoardFlags) -> int:
 
     Prints what is found, save for a share, whose findings are stored.
     """
-    rows = board.rows(flags.board, flags.method, flags.reaches)
-    checks = RowChecks(flags.runs / "verify", flags.board, rows, flags.rows, flags.redraw, flags.threads)
+    rows = board_rows.rows(flags.board, flags.method, flags.reaches)
+    checks = RowChecks(flags.runs / "verify", flags.board, rows, flags.rows, flags.threads)
     if flags.pieces.play(lambda: [checks], flags.runs, flags.threads, flags.quiet):
         return DONE
     sound = True
@@ -38,8 +38,20 @@ def verify_board(flags: BoardFlags) -> int:
             print("  its tier is now `re-run`")
     if flags.stamp:
         build.build(flags.board)
+    sound &= _verify_round(flags)
     if problems := board.differing_files(flags.board):
         print("tables and page: DIFFER from the results", *problems, sep="\n  ")
     else:
         print("tables and page: equal to those computed again from the results")
     return DONE if sound and not problems else DIFFERS
+
+
+def _verify_round(flags: BoardFlags) -> bool:
+    """Verifies the files of the latest round, and prints what is found; True if they are sound."""
+    if (latest := rounds.latest(flags.board)) is None:
+        return True
+    with progress_bar(f"round {latest.number}", flags.quiet) as progress:
+        problems = round_check.problems(latest, flags.redraw, flags.threads, progress)
+    verdict = "its files contradict each other" if problems else "its files agree"
+    print(f"round {latest.number}: {verdict}", *map(printable_line, problems), sep="\n  ")
+    return not problems

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dextron_bench.cli.support import flags
 from dextron_bench.cli.support.exit_codes import DONE
-from dextron_bench.cli.support.standings import print_endings, print_robustness, print_rows
+from dextron_bench.cli.support.standings import print_endings, print_ranks, print_robustness, print_rows
 from dextron_bench.splits.tracks import PLUS
 
 
@@ -25,7 +25,7 @@ class Show:
     """Print the rows as JSON."""
 
     def __call__(self) -> int:
-        from dextron_bench.leaderboard import collect
+        from dextron_bench.leaderboard import collect, round_table
         from dextron_bench.runs import result_files
         from dextron_bench.scores import standings
 
@@ -34,6 +34,8 @@ class Show:
         if self.json:
             print_rows(rows, as_json=True)
             return DONE
+        if self.board:
+            print_ranks(round_table.table(self.board))
         plain = rows[~rows["split"].str.contains(PLUS, regex=False)] if len(rows) else rows
         print_rows(plain)
         print_endings(plain)

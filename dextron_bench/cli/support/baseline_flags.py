@@ -9,7 +9,7 @@ from dextron_bench.cli.support import flags
 from dextron_bench.reaches.sources import RankedSource
 
 if TYPE_CHECKING:
-    from dextron_bench.leaderboard.verify_board import Row
+    from dextron_bench.leaderboard.board_rows import Row
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class BaselineFlags:
 
         Raises NotFound, DamagedFile.
         """
-        from dextron_bench.leaderboard import verify_board
+        from dextron_bench.leaderboard import board_rows
 
         rows: dict[str, list[Row]] = {}
-        for row in verify_board.rows(self.board, self.method, self.reaches):
+        for row in board_rows.rows(self.board, self.method, self.reaches):
             if not row.run.episodes.exists():
                 rows.setdefault(row.result.reaches, []).append(row)
         return rows

@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from dextron_bench.evaluation.results import Result
     from dextron_bench.scores.robustness import Robustness
 
-FRESH = ("fresh [95 %]", "gap [95 %]", "mark")  # Columns of a table in which some row has played fresh settings.
 INTERQUARTILE, REGRET, LAG = "interquartile mean [95 %]", "regret", "closing lag [s]"
-OPTIONAL = (INTERQUARTILE, "gap [95 %]", "fresh [95 %]", REGRET, "episodes", "seeds")  # On a narrow terminal.
+OPTIONAL = (INTERQUARTILE, REGRET, "episodes", "seeds")  # On a narrow terminal.
 
 
 def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
@@ -32,26 +31,46 @@ def print_rows(rows: pd.DataFrame, as_json: bool = False) -> None:
     if rows.empty:
         print("no results yet; `dextron-bench run --method exp` makes some")
         return
-    columns = ["rank", "method", "return [95 %]", "success % [95 %]", INTERQUARTILE, REGRET]
+    columns = ["method", "return [95 %]", "success % [95 %]", INTERQUARTILE, REGRET]
     for (reaches, split), group in rows.groupby(["reaches", "split"], sort=False):
         origin = ["from"] if "from" in group else []
         counts = ["seeds", "episodes", *(["failed"] if group["failed"].any() else []), *origin]
-        is_fresh = "fresh" in group and bool(group["fresh"].notna().any())
         lines = [
             [
-                cells.rank(row),
                 row["method"],
                 cells.mean_return(row),
                 cells.success(row),
                 cells.interquartile_mean(row),
                 cells.regret(row),
-                *([cells.fresh(row), cells.gap(row), cells.mark(row)] if is_fresh else []),
                 *(row[name] for name in counts),
             ]
             for row in group.to_dict("records")
         ]
         title = f"{reaches} reaches, split {split}, version {group['version'].iloc[0]}"
-        print_table(title, [*columns, *(FRESH if is_fresh else ()), *counts], lines, OPTIONAL)
+        print_table(title, [*columns, *counts], lines, OPTIONAL)
+
+
+def print_ranks(ranked: pd.DataFrame) -> None:
+    """Prints the ranks of a leaderboard's latest round, a table for each source of reaches."""
+    from dextron_bench.scores import cells
+    from dextron_bench.splits.names import EVALUATED
+
+    for reaches, rows in ranked.groupby("reaches"):
+        splits = [name for name in EVALUATED if rows[name].notna().any()]
+        lines = [
+            [
+                cells.rank(row) or row["unranked"],
+                row["method"],
+                cells.score(row),
+                *(cells.share(row, name) for name in splits),
+                row["seeds"],
+            ]
+            for row in rows.to_dict("records")
+        ]
+        title = (
+            f"round {rows['round'].iloc[0]}: {reaches} reaches, success [%], margin {100 * rows['margin'].iloc[0]:.1f}"
+        )
+        print_table(title, ["rank", "method", "score [95 %]", *splits, "seeds"], lines)
 
 
 def print_beside_published(results: list[Result], played: Collection[str], as_json: bool = False) -> bool:
@@ -67,7 +86,7 @@ def print_beside_published(results: list[Result], played: Collection[str], as_js
     if as_json:
         print_rows(rows, as_json=True)
     else:
-        both = standings.table([*results, *result_files.published_beside(results)]).drop(columns="fresh")
+        both = standings.table([*results, *result_files.published_beside(results)])
         both["from"] = both["method"].isin(rows["method"]).map({True: "this run", False: "published"})
         print_rows(both[both["split"].isin(played)])
     return bool(rows["failed"].any())

@@ -9,8 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from dextron_bench.cli.support.exit_codes import DIFFERS, DONE
-from dextron_bench.cli.support.output import print_table
-from dextron_bench.storage.printable import printable, printable_line
+from dextron_bench.storage.printable import printable_line
 
 if TYPE_CHECKING:
     from dextron_bench.submissions.manifest import Manifest
@@ -33,27 +32,6 @@ def print_verdict(verdict: Verdict) -> int:
         print(printable_line(f"note: {note}"))
     if verdict.passed:
         print(f"{name}: {verdict.tier}; {verdict.exact} of {verdict.episodes} episodes equal bit for bit")
-        print_fresh(verdict)
         return DONE
     print(f"{name}: refused", *map(printable_line, verdict.problems), sep="\n  ")
     return DIFFERS
-
-
-def print_fresh(verdict: Verdict) -> None:
-    """Prints what the agent scored on fresh settings, beside its scores on the splits, if it played any."""
-    from dextron_bench.scores import cells, standings
-
-    rows, fresh = standings.table(verdict.results.values()), next(iter(verdict.results.values())).fresh
-    if fresh is None or not rows["fresh"].notna().any():
-        return
-    lines = [
-        [
-            row["split"],
-            cells.mean_return(row),
-            cells.fresh(row),
-            cells.gap(row),
-            "beyond noise" if row["marked"] else "",
-        ]
-        for row in rows.to_dict("records")
-    ]
-    print_table(f"fresh settings, beacon {printable(fresh.beacon)}", ["split", "return", "fresh", "gap", ""], lines)

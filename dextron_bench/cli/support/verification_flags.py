@@ -24,27 +24,18 @@ class SubmissionFlags:
     """Also run the agent of the submission again, in a sandbox, from the files in its bundle."""
     trust: bool = False
     """With --rerun: run the agent even without a sandbox, with all your rights; its tier stays `replayed`."""
-    beacon: str = ""
-    """With --rerun: a public value that did not exist when the submission was made, from which fresh settings follow;
-    by default a random one."""
-    fresh_rows: int = 0
-    """With --rerun: how many fresh settings of each split its agent plays; 0 means as many as the split has."""
     board: flags.Board = flags.BOARD
     threads: flags.Threads = 0
     quiet: flags.Quiet = False
 
     def verdict(self, bundle: Path, opened: tuple[Path, Manifest]) -> Verdict:
         """Verifies a bundle that is unpacked into a folder, with its manifest."""
-        from dextron_bench.splits.fresh_settings import FreshSettings
-        from dextron_bench.storage import hashing
         from dextron_bench.submissions import verification
         from dextron_bench.submissions.seed_check import Playing
 
-        drawn = {"submission": hashing.sha256(bundle), "rows": self.fresh_rows}
-        fresh = FreshSettings(**drawn, beacon=self.beacon) if self.beacon else FreshSettings(**drawn)
         with progress_bar("verifying", self.quiet) as progress:
             how = Playing(trust=self.trust, threads=self.threads, report=progress)
-            return verification.verify(*opened, self.board, how, self.rerun, fresh)
+            return verification.verify(*opened, self.board, how, self.rerun)
 
 
 @dataclass(frozen=True)
@@ -58,7 +49,7 @@ class BoardFlags(SubmissionFlags):
     reaches: tuple[SourceName, ...] = ()
     """With --all: only rows on these sources; `real` needs the recorded reaches."""
     redraw: bool = False
-    """With --all: also draw the fresh settings of every row again from its beacon; this takes minutes for each."""
+    """With --all: also draw the settings of the latest round again from its beacon; this takes an hour."""
     stamp: bool = False
     """With --all: give baselines that ran again completely the tier `re-run`, and build the leaderboard."""
     pieces: Pieces = field(default_factory=PieceFlags)

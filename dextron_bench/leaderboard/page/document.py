@@ -25,6 +25,10 @@ from dextron_bench.world import model
 FILE = "index.html"
 SELECTED = {"reaches": "real", "split": "test"}  # The page starts with these rows if scripts may run.
 DESCRIPTIONS = {
+    "Ranks": "From settings that were drawn after all entries were fixed, the same for all. The score is the mean "
+    "success on new reaches, new people and hard settings. Beside it stand the paper's protocol, and how much more each"
+    " seed solves of its public version. A rank is 1 and the number of methods whose score is higher by more than the "
+    "margin. On real reaches, the reaches themselves are public, and the new people are two.",
     "Learning curves": "Return on val during training. Methods that do not train in the simulated world are horizontal "
     "lines at their return on test.",
     "How episodes end": "Each episode has one cause. The closing lag is the time from the expert's closing to the "
@@ -43,8 +47,12 @@ DESCRIPTIONS = {
 }
 
 
-def document(rows: pd.DataFrame, results: Iterable[Result], curves: Curves, recordings: Path, code: Code) -> str:
+def document(
+    rows: pd.DataFrame, ranked: pd.DataFrame, results: Iterable[Result], curves: Curves, recordings: Path, code: Code
+) -> str:
     """The page's HTML from the leaderboard's `rows` and a folder of recordings; equal results give equal bytes.
+
+    `ranked` is the table of the latest round (`round_table.table`).
 
     `code` holds the paths from the page to the files of submitted agents, by method and source of reaches. The page
     makes no request, and its content security policy allows only its own script. Raises BrokenRecording.
@@ -64,6 +72,7 @@ def document(rows: pd.DataFrame, results: Iterable[Result], curves: Curves, reco
         "style": style(),
         "script": script,
         "facts": _facts(rows),
+        "ranks": _section("Ranks", list(sections.ranks(ranked))) or Html(""),
         "controls": _controls(table_entries),
         "table": standings_table.table(table_entries, highlights.by_method(shown), code),
         "sections": join(*(_section(title, list(content)) for title, content in contents.items())),

@@ -73,7 +73,7 @@ function restoreChoice() {
 for (const button of table.tHead.querySelectorAll("button")) {
   const header = button.parentElement;
   button.addEventListener("click", () => {
-    const current = header.getAttribute("aria-sort"), descendingFirst = button.dataset.sort === "number" && button.textContent !== "rank";
+    const current = header.getAttribute("aria-sort"), descendingFirst = button.dataset.sort === "number";
     sort(header, current === "none" ? descendingFirst : current === "ascending");
     filter();
   });

@@ -10,7 +10,7 @@ import pandas as pd
 
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.evaluation.results import Result
-from dextron_bench.leaderboard import highlights
+from dextron_bench.leaderboard import highlights, readme
 from dextron_bench.leaderboard.highlights import Shown
 from dextron_bench.leaderboard.page import heatmaps as page_heatmaps
 from dextron_bench.leaderboard.page import tracks as page_tracks
@@ -20,7 +20,38 @@ from dextron_bench.success.exemplars import KINDS
 from dextron_bench.web import svg
 from dextron_bench.web.html import UNKNOWN, Html, join, tag
 
+RANK_TITLES = {  # By split: its heading beside the ranks.
+    "unseen-reach": "new reaches",
+    "unseen-subject": "new people",
+    "hard": "hard",
+    "test": "the paper's protocol",
+}
 Curves = Mapping[str, Mapping[str, Mapping[int, pd.DataFrame]]]  # By source of reaches, method and seed.
+
+
+def ranks(ranked: pd.DataFrame) -> Iterator[Html]:
+    """The ranks of the latest round: a table for each source, a row for each method."""
+    if ranked.empty:
+        yield tag("p", readme.NO_ROUND)
+    for reaches, rows in ranked.groupby("reaches"):
+        splits = [name for name in RANK_TITLES if rows[name].notna().any()]
+        titles = ["rank", "method", "score", *(RANK_TITLES[name] for name in splits), "more of public test", "seeds"]
+        head = tag("tr", *(tag("th", title, scope="col") for title in titles))
+        body = tag("tbody", *(_ranked(row, splits) for row in rows.to_dict("records")))
+        number, margin = rows["round"].iloc[0], 100 * rows["margin"].iloc[0]
+        title = f"Round {number} on {reaches} reaches: success [%], margin of ranks {margin:.1f} points"
+        table = tag("table", tag("caption", title), tag("thead", head), body, class_="ranks")
+        yield tag("div", _scrollable(table, title), data_reaches=str(reaches))
+
+
+def _ranked(row: Mapping[Any, Any], splits: Sequence[str]) -> Html:
+    rank = cells.rank(row) or tag("small", row["unranked"])
+    score = cells.score(row)
+    scored = tag("td", tag("b", score.value), " ", tag("span", score.interval, class_="range"), class_="number")
+    shares = [tag("td", cells.share(row, name) or UNKNOWN, class_="number") for name in splits]
+    gaps = tag("td", ", ".join(f"{100 * gap:+.1f}" for gap in row["gaps"]) or UNKNOWN, class_="number")
+    seeds = tag("td", str(row["seeds"]), class_="number")
+    return tag("tr", tag("td", rank), tag("th", row["method"], scope="row"), scored, *shares, gaps, seeds)
 
 
 def curves(by_source: Curves, rows: pd.DataFrame) -> Iterator[Html]:

@@ -16,7 +16,7 @@ from dextron_bench.web.html import UNKNOWN, Html, join, tag
 
 Links = Mapping[str, Sequence[Shown]]
 Code = Mapping[tuple[str, str], Sequence[str]]  # Paths from the page, by method and source of reaches.
-OPTIONAL = ("rank", "iqm", "regret", "fresh", "code")  # Columns that appear only if some row has them.
+OPTIONAL = ("iqm", "regret", "code")  # Columns that appear only if some row has them.
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +42,9 @@ def table(entries: Sequence[PageRow], links: Links, code: Code) -> Html:
 
 def _columns(names: set[str], links: Links, code: Code) -> list[Column]:
     columns = [
-        Column("rank", _score("rank"), lambda entry: cells.rank(entry.scores) or UNKNOWN, True, "ties share a rank"),
         Column("method", lambda entry: entry.method.lower(), _method),
         Column("return", _score("return"), _return, True, "of 20, 95 % interval"),
         Column("success", _score("success"), _success, True, "%, 95 % interval"),
-        Column("fresh", _score("fresh"), _fresh, True, "return on fresh settings, and gap"),
         Column("IQM", _score("iqm"), _interquartile_mean, True, "interquartile mean"),
         Column(
             "regret", _score("regret"), lambda entry: cells.regret(entry.scores) or UNKNOWN, True, "against experts"
@@ -96,8 +94,7 @@ def _score(name: str) -> Callable[[PageRow], Any]:
 def _method(entry: PageRow) -> Html:
     mark = "quoted" if entry.tier == QUOTED else entry.role
     note = tag("small", entry.note) if entry.note else None
-    marks = [tag("span", text, class_="mark") for text in (mark, cells.mark(entry.scores)) if text]
-    return join(tag("span", entry.method, class_="name"), *marks, note)
+    return join(tag("span", entry.method, class_="name"), tag("span", mark, class_="mark") if mark else None, note)
 
 
 def _tier(entry: PageRow) -> Html:
@@ -121,14 +118,6 @@ def _success(entry: PageRow) -> Html:
 
 def _with_interval(score: cells.Score) -> Html:
     return join(tag("b", score.value), " ", tag("span", score.interval, class_="range") if score.interval else None)
-
-
-def _fresh(entry: PageRow) -> str | Html:
-    """The mean return on fresh settings, and how much higher the return on the split is."""
-    score = cells.fresh(entry.scores)
-    if not score.value:
-        return UNKNOWN
-    return join(_with_interval(score), tag("small", f"gap {cells.gap(entry.scores)}"))
 
 
 def _interquartile_mean(entry: PageRow) -> str:

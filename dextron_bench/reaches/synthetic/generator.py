@@ -8,6 +8,8 @@ parameters.
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from scipy.interpolate import BSpline, PchipInterpolator
 
@@ -33,6 +35,7 @@ from dextron_bench.reaches.synthetic.parameters import (
 )
 
 COUNT = 1600  # Reaches in the source: 100 for each start region.
+NAME = re.compile(r"synthetic-(\d{4}|[1-9]\d{4,11})", re.ASCII)
 SAMPLING = 0.01  # [s] between samples.
 STREAM = 575  # Seed, together with the number of a reach, of everything random about it.
 GRASP = 20  # Index of the weight near the arrival, which stays as drawn; the path is built outward from it.
@@ -74,7 +77,7 @@ def generate(number: int, p: Parameters) -> Reach:
     turned = rotation.multiply(p.reference, rotation.exp(poses[:, 3:] / (2.0 * ARM)))
     ring, angle = divmod(region, ANGLES)
     return Reach(
-        name=f"synthetic-{number:04d}",
+        name=reach_name(number),
         times=np.round(times, DECIMALS),
         positions=np.round(poses[:, :3], DECIMALS),
         quaternions=rotation.continuous(np.round(rotation.unit(turned), DECIMALS)),
@@ -83,6 +86,11 @@ def generate(number: int, p: Parameters) -> Reach:
         ring=ring,
         angle=angle,
     )
+
+
+def reach_name(number: int) -> str:
+    """The name of the reach with a number."""
+    return f"synthetic-{number:04d}"
 
 
 def region_and_session(number: int, p: Parameters) -> tuple[int, int]:
@@ -143,12 +151,18 @@ def filter_noise(white: np.ndarray, taps: np.ndarray) -> np.ndarray:
 
 
 class SyntheticSource(ReachSource):
-    """The source `synthetic`, with COUNT reaches. It generates each reach at its first use."""
+    """The source `synthetic`: it draws settings on COUNT reaches, and has every reach with a name that is NAME.
+
+    It generates each reach at its first use.
+    """
 
     def __init__(self) -> None:
         super().__init__("synthetic", ())
-        self.names: tuple[str, ...] = tuple(f"synthetic-{number:04d}" for number in range(COUNT))
-        self._numbers = {name: number for number, name in enumerate(self.names)}
+        self.names = tuple(map(reach_name, range(COUNT)))
+
+    def new_reaches(self, count: int, rng: np.random.Generator) -> list[str]:
+        """Names of reaches that nobody has used."""
+        return [reach_name(int(number)) for number in rng.integers(10**6, 10**12, count)]
 
     def reach(self, name: str) -> Reach:
         """The reach of that name. Raises UnknownReach."""
@@ -162,10 +176,9 @@ class SyntheticSource(ReachSource):
         return Stratum(f"s{shipped_parameters().subjects[session]}", *divmod(region, ANGLES))
 
     def _number(self, name: str) -> int:
-        try:
-            return self._numbers[name]
-        except KeyError:
-            raise UnknownReach(name, self.name, self.names) from None
+        if not (isinstance(name, str) and (known := NAME.fullmatch(name))):
+            raise UnknownReach(name, self.name, self.names)
+        return int(known[1])
 
 
 def open_synthetic() -> SyntheticSource:

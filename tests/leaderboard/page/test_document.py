@@ -14,9 +14,11 @@ import pytest
 from dextron_bench.evaluation.diagnosis import CAUSES
 from dextron_bench.evaluation.results import Result
 from dextron_bench.leaderboard import page as leaderboard_page
+from dextron_bench.leaderboard import round_table
 from dextron_bench.scores import standings
 from dextron_bench.splits.loading import load_split
 from dextron_bench.splits.tracks import PLUS
+from dextron_bench.web.html import UNKNOWN
 from tests.helpers import results
 from tests.helpers.browser import visit
 
@@ -24,6 +26,13 @@ BOARD = Path(__file__).parents[3] / "leaderboard"
 PUBLISHED = (BOARD / leaderboard_page.FILE).as_uri()
 ALL = f"{PUBLISHED}#reaches=&split="  # Without the filter that the page starts with.
 EVIL = "<script>alert(1)</script>", """"><img src=x onerror=alert(1)>'&amp; $x$ ]]>"""
+RANKED = pd.DataFrame(
+    [
+        ["minjerk", EVIL[0], 1.0, "", 0.75, 0.7, 0.8, 0.9, 0.8, 0.75, 0.7, [0.01, -0.02], 2, 3, 0.05],
+        ["minjerk", EVIL[1], float("nan"), "a ceiling", 0.5, 0.4, 0.6, 0.9, 0.6, float("nan"), 0.4, [], 1, 3, 0.05],
+    ],
+    columns=[*round_table.COLUMNS],
+)
 Table = dict[tuple[str, str, str], dict[str, Any]]  # Rows by method, source of reaches and split.
 NAMES = "method", "success", "frames"
 
@@ -36,11 +45,11 @@ def table() -> Table:
 @pytest.fixture
 def evil(tmp_path: Path) -> str:
     """The address of a page whose names of methods and machines contain HTML and scripts."""
-    rows = standings.table([*map(result, EVIL)]).assign(rank=[1, 1], iqm=[19.5, 18.25], regret=[0.5, 1.75])
+    rows = standings.table([*map(result, EVIL)]).assign(iqm=[19.5, 18.25], regret=[0.5, 1.75])
     points = pd.DataFrame({"epoch": [10, 20], "return": [1.0, 2.0]})
     curves = {"minjerk": {method: {0: points} for method in EVIL}}
     file = tmp_path / leaderboard_page.FILE
-    file.write_text(leaderboard_page.document(rows, map(result, EVIL), curves, tmp_path, {}), encoding="utf-8")
+    file.write_text(leaderboard_page.document(rows, RANKED, map(result, EVIL), curves, tmp_path, {}), encoding="utf-8")
     return file.as_uri()
 
 
@@ -236,10 +245,13 @@ def test_names_of_strangers_are_text_everywhere(browser: Any, evil: str):
         opened.on("dialog", lambda dialog: pytest.fail(dialog.message))
         assert shown(opened) == [*sorted(EVIL)]
         assert opened.evaluate("[document.scripts.length, document.images.length]") == [1, 0]
-        for name in EVIL:
-            assert opened.get_by_text(name, exact=True).count() >= 4  # The table, endings, heat map, and the curves.
+        for name in EVIL:  # In the ranks, the table, endings, heat map, and the curves.
+            assert opened.get_by_text(name, exact=True).count() >= 5
+        ranks = [text.split("\t") for text in opened.locator("table.ranks tbody tr").all_inner_texts()]
+        assert ranks[0] == ["1", EVIL[0], "75.0 [70.0, 80.0]", "80.0", "75.0", "70.0", "90.0", "+1.0, -2.0", "2"]
+        assert [text.strip() for text in ranks[1][:3]] == ["a ceiling", EVIL[1], "50.0 [40.0, 60.0]"]
+        assert ranks[1][3:] == ["60.0", UNKNOWN, "40.0", "90.0", UNKNOWN, "1"]
         rows = cells(opened)
-        assert [row["rank"][0] for row in rows] == ["1", "1"]
         assert [row["IQM"][0] for row in rows] == ["19.50", "18.25"]
         assert [row["regret"][0] for row in rows] == ["0.50", "1.75"]
         assert {(row["tier"][0], row["frames"][0], row["demos"][0]) for row in rows} == {("re-run", "1,000", "12,345")}
@@ -273,5 +285,5 @@ def test_links_to_recordings_lead_to_shipped_files(browser: Any):
 @pytest.mark.slow
 def test_equal_results_make_equal_pages(tmp_path: Path):
     rows = standings.table(map(result, EVIL))
-    pages = {leaderboard_page.document(rows, map(result, EVIL), {}, tmp_path, {}) for _ in range(2)}
+    pages = {leaderboard_page.document(rows, RANKED, map(result, EVIL), {}, tmp_path, {}) for _ in range(2)}
     assert len(pages) == 1

@@ -104,9 +104,19 @@ def test_every_path_passes_the_bottle_with_its_offset(number: int, noise: float,
 
 def test_the_error_for_an_unknown_name_lists_names(source: generator.SyntheticSource):
     with pytest.raises(UnknownReach, match="synthetic-0000"):
-        source.reach("synthetic-1600")
+        source.reach("synthetic-01600")
     with pytest.raises(UnknownReach, match="synthetic-0000"):
         source.stratum("01_fl_01")
+
+
+def test_new_reaches_are_reaches_that_no_setting_has_used(source: generator.SyntheticSource):
+    """Their numbers follow from the generator, and give start regions and subjects as other numbers do."""
+    names = source.new_reaches(3, np.random.default_rng(5))
+    assert names == source.new_reaches(3, np.random.default_rng(5))
+    assert not set(names) & set(source.names)
+    number = int(names[0].removeprefix("synthetic-"))
+    assert source.reach(names[0]).name == names[0] == generator.generate(number, parameters.shipped_parameters()).name
+    assert (source.stratum(names[0]).ring, source.stratum(names[0]).angle) == divmod(number % 16, 4)
 
 
 def test_values_are_mapped_between_quantiles():
