@@ -167,7 +167,7 @@ def test_published_rows_of_the_same_splits_and_physics_stand_beside_the_new_ones
         capsys.readouterr()
         assert main.main(["run", "--method", "nothing", "--record", "0", "--split", "test"]) == 0
         cells = [[cell.strip() for cell in line.split("│")] for line in capsys.readouterr().out.splitlines()]
-        return {line[2]: line[-2] for line in cells if len(line) > 4}
+        return {line[1]: line[-2] for line in cells if len(line) > 4}
 
     assert main.main(["run", "--method", "exp", "--record", "0", "--runs", "board"]) == 0
     monkeypatch.setattr(result_files, "published_results", lambda: here / "board")
