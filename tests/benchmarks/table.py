@@ -15,7 +15,8 @@ HEAD = """# Benchmarks
 `make bench` runs these measurements and writes this file. Two ways of doing the same thing take turns in one process,
 and we compare their medians. The ratios therefore hold even if other load on the machine changes the rates. In the
 first rows, the bare physics gets the same states, controls and carrier poses as the episodes, and nothing is read back.
-There, paths are made beforehand, and their cost is listed separately.
+There, paths are made beforehand, and their cost is listed separately. How long the tests take is in
+[CONTRIBUTING.md](../CONTRIBUTING.md).
 
 | what | rate | compared with | its rate | ratio |
 | --- | ---: | --- | ---: | ---: |
