@@ -12,9 +12,7 @@ from dextron_bench.recording.viewer import ViewerError, require_screen, screensh
 from dextron_bench.recording.web_viewer import web_viewer_files
 
 __all__ = [
-    "BadInput",
     "BrokenRecording",
-    "Failed",
     "LiveView",
     "Recording",
     "Summary",
