@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dextron_bench.leaderboard import rounds
+from dextron_bench.leaderboard import round_entries, rounds
 from dextron_bench.leaderboard.board_rows import Row
 from dextron_bench.leaderboard.round_work import read_episodes
 from dextron_bench.methods import registry
@@ -37,8 +37,8 @@ def table(board: Path) -> pd.DataFrame:
     """
     if (round_ := rounds.latest(board)) is None:
         return pd.DataFrame(columns=list(COLUMNS))
-    by_name = rounds.rows_by_name(board)
-    learners = {name for name, rows in by_name.items() if rounds.learns(rows)}
+    by_name = round_entries.rows_by_name(board)
+    learners = {name for name, rows in by_name.items() if round_entries.learns(rows)}
     authors = round_.commitments.authors
     episodes = read_episodes(round_)
     rows = [

@@ -13,7 +13,7 @@ import pandas as pd
 
 from dextron_bench.evaluation.episodes import Episode, action_hashes
 from dextron_bench.evaluation.rollout import rollout
-from dextron_bench.leaderboard import collect, rounds
+from dextron_bench.leaderboard import collect, round_entries, rounds
 from dextron_bench.leaderboard.baseline_check import agents_of
 from dextron_bench.leaderboard.board_rows import Row
 from dextron_bench.leaderboard.rounds import Round
@@ -34,7 +34,6 @@ from dextron_bench.world import model
 
 FILE = ".parquet"  # Ending of the file of a piece, beside its stamp.
 BOARD = "board"  # Folder below the runs of another process, with the files of the row and of the round.
-NOT_NEEDED = (".rrd", ".parquet")
 ROUND: tables.Columns = {  # The columns of a round's episodes.
     **dict.fromkeys(("method", "reaches", "split", "actions"), texts),
     "seed": counts,
@@ -73,9 +72,7 @@ class RoundWork(ListedWork):
         row = self._rows()[name]
         places = (row.run.path.parent, self.round.folder)
         files = [file for place in places for file in visible(place, "**/*") if file.is_file()]
-        settings = self.round.settings_file(row.result.reaches)
-        needed = [file for file in files if file.suffix not in NOT_NEEDED or file == settings]
-        inputs = {f"{BOARD}/{file.relative_to(self.round.board).as_posix()}": file for file in needed}
+        inputs = {f"{BOARD}/{file.relative_to(self.round.board).as_posix()}": file for file in files}
         again = partial(_play_again, identity=row.run.identity, number=self.round.number)
         return Recipe(again, row.result.reaches, inputs)
 
@@ -102,7 +99,8 @@ class RoundWork(ListedWork):
 
 def work(round_: Round, runs: Path, threads: int = 0) -> RoundWork:
     """The work of a round, below a folder of runs; raises BadInput if a row was changed since it was announced."""
-    return RoundWork(runs / rounds.FOLDER / str(round_.number), round_, rounds.rows_of(round_), threads)
+    rows = round_entries.announced(round_.board, round_.number, round_.commitments.entries)
+    return RoundWork(runs / rounds.FOLDER / str(round_.number), round_, rows, threads)
 
 
 def play_row(row: Row, splits: Sequence[Split], threads: int, report: Progress) -> pd.DataFrame:
@@ -125,9 +123,12 @@ def play_row(row: Row, splits: Sequence[Split], threads: int, report: Progress) 
 def read_episodes(round_: Round) -> pd.DataFrame:
     """The episodes of a round that is over, the columns ROUND; raises DamagedFile if a seed lacks some."""
     table = tables.read_own(file := round_.episodes_file, ROUND)
+    settings = {
+        reaches: [(split.name, row) for split in round_.splits(reaches) for row in range(len(split))]
+        for reaches in set(table["reaches"])
+    }
     for (method, reaches, seed), part in table.groupby(["method", "reaches", "seed"]):
-        played = list(zip(part["split"], part["row"], strict=True))
-        if played != [(split.name, row) for split in round_.splits(str(reaches)) for row in range(len(split))]:
+        if list(zip(part["split"], part["row"], strict=True)) != settings[str(reaches)]:
             raise atomic.OtherForm(file, f"episodes of {method}/{reaches}, seed {seed}, do not fit its settings")
     return table
 

@@ -7,36 +7,25 @@ on them. The latest round counts; one that is void does not, and stays.
 
 from __future__ import annotations
 
+import hashlib
 import secrets
-from collections import Counter, defaultdict
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
-
-import pandas as pd
 
 from dextron_bench.errors import BadInput, NotFound
 from dextron_bench.experts import montecarlo
-from dextron_bench.leaderboard import board_rows
-from dextron_bench.leaderboard.board_rows import Row
-from dextron_bench.methods import registry
-from dextron_bench.reaches import setting
-from dextron_bench.reaches.sources import RankedSource
+from dextron_bench.leaderboard import round_entries
 from dextron_bench.splits import fresh
-from dextron_bench.splits.loading import Split, cases_from_frame, split_digest
+from dextron_bench.splits.loading import Split
 from dextron_bench.storage import atomic, hashing, records, tables
 from dextron_bench.storage.folders import visible
 from dextron_bench.storage.progress import Progress, no_progress
 from dextron_bench.storage.records import Count, Record
-from dextron_bench.submissions import bundle, names
-from dextron_bench.submissions.manifest import Manifest
 from dextron_bench.world import model
 from dextron_bench.world.engine import Engine
 
 FOLDER = "rounds"  # In the leaderboard's folder: a folder for each round, named by its number.
 ROWS = 500  # Settings of each split; a round has this many or more.
-ENTRIES = 3  # Rows of one author in a round.
 OPERATOR = "operator "  # A beacon that begins so is a secret of the operator's, whose SHA-256 follows.
 
 
@@ -129,7 +118,7 @@ class Round:
             raise NotFound(f"the settings of round {self.number} are not drawn yet; give the beacon's --value")
         if not (digests := records.read(self.draw_file, Draw).digests.get(reaches)):
             return []
-        splits = from_frame(tables.read_own(file := self.settings_file(reaches), tables.CASES), reaches)
+        splits = fresh.from_frame(tables.read_own(file := self.settings_file(reaches), tables.CASES), reaches)
         if {split.name: split.digest for split in splits} != digests:
             raise atomic.OtherForm(file, f"its settings are others than {self.draw_file.name} names")
         return splits
@@ -167,7 +156,7 @@ def announce(board: Path, beacon: str = "", rows: int = ROWS) -> tuple[Round, st
         raise BadInput(f"a round has at least {ROWS} settings of each split, not {rows}")
     secret = "" if beacon else secrets.token_hex(16)
     round_ = Round(board, known[-1].number + 1 if known else 1)
-    entries, authors = _entries(board)
+    entries, authors = round_entries.of_board(board)
     commitments = Commitments(
         round_.number, model.mjcf_hash(), rows, beacon or OPERATOR + _sha256(secret), entries, authors
     )
@@ -190,8 +179,8 @@ def draw(round_: Round, value: str, threads: int = 0, report: Progress = no_prog
     for reaches in sorted({name.partition("/")[2] for name in commitments.entries}):
         if not (file := round_.settings_file(reaches)).exists():
             drawn = fresh.draw(reaches, round_.seed(value), engine, commitments.rows, report)
-            tables.write(file, to_frame(drawn))
-        splits = from_frame(tables.read_own(file, tables.CASES), reaches)
+            tables.write(file, fresh.to_frame(drawn))
+        splits = fresh.from_frame(tables.read_own(file, tables.CASES), reaches)
         digests[reaches] = {split.name: split.digest for split in splits}
     sha256 = hashing.sha256(round_.commitments_file)
     atomic.write_json(round_.draw_file, Draw(value, sha256, digests))
@@ -202,91 +191,5 @@ def declare_void(round_: Round, reason: str) -> None:
     atomic.write_json(round_.void_file, Void(reason))
 
 
-def rows_of(round_: Round) -> list[Row]:
-    """The rows of the board that play a round, as they were announced.
-
-    Raises BadInput if one of them was changed since, NotFound, DamagedFile.
-    """
-    entries = round_.commitments.entries
-    by_name = rows_by_name(round_.board)
-    for name, announced in entries.items():
-        if name not in by_name or entry_hash(by_name[name]) != announced:
-            raise BadInput(f"{name} is not what round {round_.number} has announced; it cannot play in it")
-    return [row for name in entries for row in by_name[name]]
-
-
-def entry_hash(rows: list[Row]) -> str:
-    """The hash of what plays as a row on one source: of a submission its manifest, of a baseline code and weights."""
-    first = rows[0]
-    manifest = first.run.path.parent / bundle.MANIFEST
-    if manifest.exists():
-        return hashing.sha256(manifest)
-    maker = first.result.maker
-    assert maker is not None
-    code = [file.read_bytes() for file in registry.package_files(registry.find_method(maker.method))]
-    weights = [row.result.training.sha256 for row in rows if row.result.training]
-    about = atomic.json_text({"method": maker.method, "settings": maker.settings, "weights": weights})
-    return hashing.digest(about.encode(), *code)
-
-
-def can_play(row: Row) -> bool:
-    """True if a row can be run again: a baseline that ships, or a submission that was run again in the sandbox."""
-    if row.run.episodes.exists():
-        return row.result.tier == "re-run"
-    return row.result.maker is not None and row.result.maker.method in registry.installed_methods()
-
-
-def learns(rows: list[Row]) -> bool:
-    """True if what plays as a row was trained: a learner, or a submission that does not declare a rule."""
-    manifest = rows[0].run.path.parent / bundle.MANIFEST
-    if manifest.exists():
-        return not records.read(manifest, Manifest).declared.rule
-    return any(row.result.training for row in rows)
-
-
-def rows_by_name(board: Path) -> Mapping[str, list[Row]]:
-    """The rows of a board on sources that rank, by method and source, as in `bc/real`; their seeds in order."""
-    by_name: dict[str, list[Row]] = defaultdict(list)
-    for row in board_rows.rows(board, reaches=get_args(RankedSource)):
-        by_name[f"{row.result.method}/{row.result.reaches}"].append(row)
-    return by_name
-
-
-def to_frame(splits: list[Split]) -> pd.DataFrame:
-    """A table of fresh settings, from which `from_frame` makes the splits again."""
-    return pd.concat([_frame(split) for split in splits], ignore_index=True)
-
-
-def from_frame(table: pd.DataFrame, reaches: str) -> list[Split]:
-    """The fresh splits in a table with the columns of a setting, `split`, `gain` and `critical`."""
-    return [
-        Split(name=str(name), reaches=reaches, digest=split_digest(rows), cases=tuple(cases_from_frame(rows)))
-        for name, rows in table.assign(window=0.0).groupby("split", sort=False)
-    ]
-
-
-def _frame(split: Split) -> pd.DataFrame:
-    experts = pd.DataFrame([(case.expert.gain, case.expert.critical) for case in split.cases])
-    frame = setting.to_frame([case.setting for case in split.cases])
-    return frame.assign(split=split.name, gain=experts[0], critical=experts[1])
-
-
-def _entries(board: Path) -> tuple[dict[str, str], dict[str, str]]:
-    """The hashes of all rows that will play, and the authors of submissions; raises BadInput."""
-    playing = {name: rows for name, rows in rows_by_name(board).items() if can_play(rows[0])}
-    authors = {}
-    for name, rows in playing.items():
-        manifest = rows[0].run.path.parent / bundle.MANIFEST
-        if manifest.exists():
-            declared = records.read(manifest, Manifest).declared.authors
-            authors[name] = names.appearance(declared or rows[0].result.method)
-    for reaches in get_args(RankedSource):
-        of_author = Counter(author for name, author in authors.items() if name.endswith(f"/{reaches}"))
-        for author, count in of_author.most_common(1):
-            if count > ENTRIES:
-                raise BadInput(f"{author!r} has {count} rows on {reaches} reaches; a round takes {ENTRIES}")
-    return {name: entry_hash(rows) for name, rows in playing.items()}, authors
-
-
 def _sha256(text: str) -> str:
-    return hashing.digest(text.encode())
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -112,3 +112,22 @@ def _hard(
         scanner, near, near.head(0), distance, sizes.coarse, sizes.scan, new_noise=source.sample_noise
     )
     return settings.draw(count, seed, progress).assign(window=0.0)
+
+
+def to_frame(splits: list[Split]) -> pd.DataFrame:
+    """A table of fresh settings, from which `from_frame` makes the splits again."""
+    return pd.concat([_frame(split) for split in splits], ignore_index=True)
+
+
+def from_frame(table: pd.DataFrame, reaches: str) -> list[Split]:
+    """The fresh splits in a table with the columns of a setting, `split`, `gain` and `critical`."""
+    return [
+        Split(name=str(name), reaches=reaches, digest=split_digest(rows), cases=tuple(cases_from_frame(rows)))
+        for name, rows in table.assign(window=0.0).groupby("split", sort=False)
+    ]
+
+
+def _frame(split: Split) -> pd.DataFrame:
+    experts = pd.DataFrame([(case.expert.gain, case.expert.critical) for case in split.cases])
+    frame = setting.to_frame([case.setting for case in split.cases])
+    return frame.assign(split=split.name, gain=experts[0], critical=experts[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,7 +11,7 @@ import pandas as pd
 import pytest
 
 from dextron_bench.cli import main
-from dextron_bench.leaderboard import rounds
+from dextron_bench.leaderboard import round_entries, rounds
 from dextron_bench.splits import fresh
 from dextron_bench.splits.loading import Split, cases_from_frame, split_digest
 from dextron_bench.storage import tables
@@ -23,7 +24,7 @@ Refused = Callable[..., str]
 def draw(reaches: str, seed: int, engine: object, rows: int, progress: object = None) -> list[Split]:
     """Instead of a search: two settings that an expert solves, with noise that follows from the seed."""
     table = pd.DataFrame([("-", *one) for one in tiny_benchmark.SOLVED], columns=tiny_benchmark.COLUMNS)
-    table = table.assign(window=0.0, duration_noise=table["duration_noise"] + seed % 7 / 1000)
+    table = table.assign(window=0.0, duration_noise=table["duration_noise"] + seed % 9973 / 2e6)
     cases = tuple(cases_from_frame(table))
     return [Split(name=name, reaches=reaches, digest=split_digest(table), cases=cases) for name in NAMES]
 
@@ -114,7 +115,8 @@ def test_settings_that_were_changed_are_refused(here: Path, complaint: Refused):
 
 
 def test_an_operator_cannot_choose_another_secret(here: Path, complaint: Refused):
-    rounds.announce(here / "leaderboard", rows=2)
+    announced, secret = rounds.announce(here / "leaderboard", rows=2)
+    assert announced.commitments.beacon == f"operator {hashlib.sha256(secret.encode()).hexdigest()}"
     text = complaint("leaderboard", "round", "--value", "another", "--quiet")
     assert "'another' is not the secret whose hash round 2 has announced" in text
     assert "needs the value of its beacon: operator " in complaint("leaderboard", "round", "--quiet")
@@ -142,7 +144,7 @@ def test_a_row_that_changes_after_the_announcement_cannot_play(here: Path, compl
 
 def test_a_row_that_nobody_ran_again_plays_no_round(here: Path):
     """It has episodes, as a submission, but not the tier `re-run`."""
-    rows = rounds.rows_by_name(here / "leaderboard")["reflex/synthetic"]
-    assert rounds.can_play(rows[0])
+    rows = round_entries.rows_by_name(here / "leaderboard")["reflex/synthetic"]
+    assert round_entries.can_play(rows[0])
     rows[0].run.episodes.touch()
-    assert not rounds.can_play(rows[0])
+    assert not round_entries.can_play(rows[0])
